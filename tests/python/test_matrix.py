@@ -30,10 +30,9 @@ OPEN = {
     # The six-step drive keeps its full speed without this switch, within its current, and does not say so.
     **cells([SIX], ["high_open"], ["full"], "cause", "time"),
     # With a switch that never turns on, the torque that low speed allows, a drop as large as the back-EMF, takes the
-    # others' currents up to 1.9 A above 1.2 times the limit in a start, and 0.3 A in braking. With half of that torque
+    # others' currents up to 1.3 A above 1.2 times the limit in a start, and 0.3 A in braking. With half of that torque
     # it is met, and thrust comes later.
-    **cells([FOC], ["low_open"], ["start"], "current"),
-    **cells([FOC], ["high_open"], ["braking"], "current"),
+    **cells([FOC], ["high_open"], ["start", "braking"], "current"),
     **cells([SIX], ["low_open"], ["braking"], "current", "cause"),
     # At idle little more flows than a sound sensor may be off by. The six-step drive's start meets a sensor that shows
     # nothing with more current.

@@ -171,11 +171,12 @@ impl Supply {
         };
     }
 
-    /// Allows no vector longer than this until [`update_limits`](Self::update_limits) is called.
-    pub fn shorten(&mut self, length: Voltage) {
-        let length = length.min(self.longest.length);
-        self.longest = VectorLimit::new(length, Voltage::ZERO);
-        self.readable_square = self.readable_square.min(self.longest.square);
+    /// Limits vectors as if the supply were at most this, until [`update_limits`](Self::update_limits) is called.
+    pub fn limit_as_from(&mut self, config: &Config, bus: Voltage) {
+        let present = self.bus;
+        self.bus = present.min(bus);
+        self.update_limits(config, Voltage::ZERO);
+        self.bus = present;
     }
 }
 
@@ -436,25 +437,19 @@ mod tests {
     }
 
     #[test]
-    fn a_shortened_vector_is_no_longer_than_that_and_all_of_the_supply_comes_back() {
+    fn a_vector_is_limited_as_from_a_lower_supply_and_never_a_higher_one() {
         // Here every phase can be read up to 0.9 of the longest vector.
         let config = Config::new(Modulation::SpaceVector, 0.95, 0.9);
-        let mut supply = Supply::new(&config, Voltage::from_num(4), Voltage::ZERO);
-        let all = supply;
-        supply.shorten(Voltage::from_num(0.5));
-        let asked = Dq {
-            d: WideVoltage::from_num(0.3),
-            q: WideVoltage::from_num(1.0),
-        };
-        assert!(square_of(asked) <= all.readable_square);
-        assert!(square_of(asked) > supply.readable_square);
-        let (u, cut) = limit(asked, &supply.longest);
-        let length = u.d.to_num::<f64>().hypot(u.q.to_num());
-        assert!((length - 0.5).abs() < 1e-3 && cut.is_some(), "{length}");
-        supply.shorten(Voltage::from_num(6));
-        assert_eq!(supply.longest.length(), Voltage::from_num(0.5));
-        supply.update_limits(&config, Voltage::ZERO);
-        assert_eq!(supply, all);
+        let [low, present, high] = [1, 4, 6].map(Voltage::from_num);
+        let mut supply = Supply::new(&config, present, Voltage::ZERO);
+        let whole = supply;
+        let lower = Supply::new(&config, low, Voltage::ZERO);
+        let limits = |supply: &Supply| (supply.longest, supply.readable_square);
+        supply.limit_as_from(&config, low);
+        assert_eq!(limits(&supply), limits(&lower));
+        assert_eq!((supply.bus, supply.reciprocal), (present, whole.reciprocal));
+        supply.limit_as_from(&config, high);
+        assert_eq!(supply, whole);
     }
 
     #[test]

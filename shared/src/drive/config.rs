@@ -82,10 +82,10 @@ pub struct Config {
     pub low_speed: low_speed::Config,
     /// The quick attempt, and those of a start in order.
     pub start: [start::Config; 1 + ATTEMPTS],
-    /// Longest voltage vector of an open-loop start: what takes a sound motor's current to its limit at the speed
-    /// where the start ends. Where a phase does not conduct, the regulator asks for ever more, which would trip the
-    /// other phases as the rotor turns on.
-    pub start_voltage: Voltage,
+    /// Supply whose longest vector an open-loop start may use: enough to take a sound motor's current to its limit at
+    /// the speed where the start ends. Where a phase does not conduct, the regulator asks for ever more, which would drive the
+    /// other phases far beyond the limit as the frame turns on.
+    pub start_bus: Voltage,
     /// Greatest current of a test of the motor.
     pub test_current: Current,
     /// Speed below which the observer no longer leads.

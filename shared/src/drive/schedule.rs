@@ -116,8 +116,8 @@ const RUN: &[Row] = &[
     (Work::ROTOR, 26, CYCLE),
 ];
 
-/// Open-loop start. Its current takes little of the supply's voltage and is bounded by the supply alone, so it
-/// needs no speed-dependent bounds, and its longest vector is the one that it began with.
+/// Open-loop start. Its current is bounded by the supply alone, so it needs no speed-dependent bounds, and takes little
+/// of the supply's voltage: its longest vector, [`start_bus`](super::config::Config::start_bus), stays.
 const START: &[Row] = &[
     (Work::DAMP, 1, DAMP_PERIODS),
     (Work::START_CURRENT, 0, PERIODS),

@@ -135,7 +135,9 @@ impl Shaft {
         let k = 1.5 * pole_pairs * pole_pairs * 1e-3 * report.flux_mwb.value;
         let j_kgm2 = k * (up.charge_as * down.speed_square - down.charge_as * up.speed_square)
             / (up.gained_rad_s * down.speed_square - down.gained_rad_s * up.speed_square);
-        if report.flux_mwb.spread < FLUX_SPREAD && j_kgm2 > 0.0 {
+        // Where the rotor was lost, a product's sum may be negative, which is no square.
+        let are_squares = up.emf_square > 0.0 && down.emf_square > 0.0;
+        if are_squares && report.flux_mwb.spread < FLUX_SPREAD && j_kgm2 > 0.0 {
             report.j_gcm2 = Figure::of(&[j_kgm2], 1e7);
             return Ok(());
         }
@@ -147,7 +149,7 @@ impl Shaft {
 mod tests {
     use super::*;
 
-    /// Noise of the voltages lengthens a vector on average, here by over 2 %.
+    /// Noise of the voltages lengthens a vector on average, here by over 3 %.
     #[test]
     fn noise_does_not_add_to_the_flux() {
         const FLUX_WB: f32 = 5e-3;
@@ -177,8 +179,8 @@ mod tests {
             length_wb += length(e_d, e_q) / omega_rad_s / 1000.0;
         }
         let flux_wb = square_root(run.emf_square / run.speed_square);
-        assert!((flux_wb / FLUX_WB - 1.0).abs() < 0.01, "{flux_wb}");
-        assert!(length_wb / FLUX_WB > 1.02, "{length_wb}");
+        assert!((flux_wb / FLUX_WB - 1.0).abs() < 0.02, "{flux_wb}");
+        assert!(length_wb / FLUX_WB > 1.03, "{length_wb}");
         assert!((run.gained_rad_s / 399.6 - 1.0).abs() < 1e-4);
         assert!((run.charge_as / 0.4995 - 1.0).abs() < 1e-3);
     }

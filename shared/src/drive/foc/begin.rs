@@ -52,6 +52,11 @@ pub(in crate::drive) fn begin(
             let theta = theta.wrapping_add(omega.over_periods(periods));
             foc.loops.commanded_voltages = commanded_voltages(config, theta, omega);
         }
+        // Where sensors show a rotor at rest, Run updates it six periods after it has begun.
+        (COMMANDED, None) => {
+            let supply = &mut shared.supply;
+            supply.limit_as_from(&config.modulator, config.start_bus);
+        }
         (PREPARATION_PERIODS, _) => {
             let omega = turning.map(|(_, omega)| omega);
             return Some(enter_drive(config, foc, shared, sample, setpoint, omega));
@@ -113,7 +118,6 @@ fn enter_drive(
             config.speed.preset(speed, Speed::ZERO, Current::ZERO);
             Why::Caught
         } else {
-            shared.supply.shorten(config.start_voltage);
             Why::Stands
         }
     }

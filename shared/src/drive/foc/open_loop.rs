@@ -1,6 +1,5 @@
 //! The open-loop start, Park and Ramp, and mode changes caused by the rotor.
 
-use super::outer_loop;
 use super::state::State;
 use crate::control::observer::Observer;
 use crate::control::regulator::Reference;
@@ -169,7 +168,5 @@ pub(in crate::drive) fn hand_over(
         .regulator
         .preset(&mut loops.regulator, u, &reference, &fb);
     loops.reference = reference;
-    // The start's was shorter.
-    outer_loop::longest_vector(config, shared);
     Some(Why::HandedOver)
 }

@@ -7,7 +7,7 @@ use core::cell::Cell;
 
 use super::quantity::Quantity;
 use super::si::Si;
-use super::{low_speed, observer, outer, sensing};
+use super::{low_speed, observer, outer, sensing, start};
 use crate::control::speed::Bounds;
 use crate::control::{dead_time, observer as observers, torque};
 use crate::drive::Drift;
@@ -168,6 +168,15 @@ fn the_six_step_bound_looks_towards_zero_by_a_quarter_of_the_limit() {
     near("lead", lead_a, 2.0);
     // With 20 A to the bound, which counts where the limit is less.
     near("rate", all_in_s, 1.0 / 320.0);
+}
+
+#[test]
+fn a_start_may_use_what_takes_the_current_to_its_limit_at_its_end() {
+    // 1200 rpm of 7 pole pairs are 879.65 rad/s: 33 mΩ take 1.32 V of 40 A, 12 µH 0.4222 V, and the flux of 0.3215 mWb
+    // induces 0.2828 V. Half of the supply is its longest vector.
+    let changes = [(ParamId::StaRunRpm, 1200.0)];
+    let volts = made(&changes, |p| p.scale.volts(start::bus(p)));
+    near("supply", volts, 2.0 * (1.32 + 0.4222 + 0.2828));
 }
 
 /// Returns the observer's ω_n that follows `LIM_PHASE_A`, and its greatest, 1/s.

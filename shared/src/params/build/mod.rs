@@ -34,7 +34,7 @@ use crate::control::modulator::{self, Modulation};
 use crate::control::sensing::Shunts;
 use crate::drive::{Config, Direction, Drift, Stop, Thresholds};
 use crate::input::signal::Signal;
-use crate::math::{Held, Real};
+use crate::math::Real;
 use crate::protection;
 use crate::units::{Current, Scale, Voltage, stated_emf};
 use core::cell::Cell;
@@ -189,10 +189,7 @@ pub fn build_in(
         count clear_periods([CLEAR_S] / T),
         count proven_periods([PROVEN_S] / T),
         count lost_periods([LOST_S] / T),
-        number start_voltage(R * LimitA min SupplyMaxV / UnitV),
     });
-    let [attempt, ..] = &place.start;
-    place.start_voltage = place.start_voltage.plus(stated_emf(attempt.run_speed));
     place.modulator = modulator::Config::new(
         modulation,
         duty_max,
@@ -202,6 +199,7 @@ pub fn build_in(
             Shunts::Two => 0.0,
         },
     );
+    place.start_bus = start::bus(&p);
     sensing::sensing(&p, window, &mut place.sensing);
     sensing::catch(&p, &mut place.catch);
     place.charge = sensing::charge(&p);

@@ -143,7 +143,7 @@ quantities! {
     // Of the start.
     own {
         AttemptA, AttemptJ, Haste, TorqueNm, PossibleRadS2, RampRadS2, SwingRadS, SwingTurns, SwingAs,
-        ParkCharge, HalfCharge,
+        ParkCharge, HalfCharge, AgainstRadS, ReactanceOhm, EmfV,
     }
     // Of the other observers.
     own { Decay, ActsS, Chi, ChiSquare, OmegaN, Following }

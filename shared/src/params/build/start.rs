@@ -2,13 +2,13 @@
 
 use core::f32::consts::TAU;
 
-use super::formula::{define, fill, value};
+use super::formula::{define, fill, formulas, value};
 use super::quantity::Quantity;
 use super::si::Si;
 use crate::control::start;
 use crate::drive::ATTEMPTS;
 use crate::math::square_root;
-use crate::units::INVERSE_FLUX_NOMINAL;
+use crate::units::{INVERSE_FLUX_NOMINAL, Voltage};
 
 /// Damping ζ of the rotor's swing about the current vector in Park and Ramp.
 const SWING_DAMPING: f32 = 0.5;
@@ -39,6 +39,9 @@ const PARK_SWINGS: f32 = 3.0;
 /// Time for which a rotor may turn too slowly in Ramp, in periods of its swing.
 const ASTRAY_SWINGS: f32 = 1.0;
 
+/// Supply over the voltage of its longest vector: 1.75 to 2.2, by modulation and largest duty.
+const SUPPLY: f32 = 2.0;
+
 /// Fills in the attempts of a start (section 3.2 of the second paper): each has more current, up to `LIM_PHASE_A`, and
 /// is slower than the one before.
 pub(super) fn attempts(p: &Si, places: &mut [start::Config; 1 + ATTEMPTS]) {
@@ -48,6 +51,19 @@ pub(super) fn attempts(p: &Si, places: &mut [start::Config; 1 + ATTEMPTS]) {
         p.set(Quantity::Haste, *haste);
         attempt(p, place);
     }
+}
+
+/// Returns the supply that an open-loop start may use: [`SUPPLY`] times the voltage (R + ω_cl·L)·`LIM_PHASE_A` plus the
+/// back-EMF at ω_cl. In two phases of a rotor that stands, R·`LIM_PHASE_A` alone makes √3/2 of the limit.
+pub(super) fn bus(p: &Si) -> Voltage {
+    let formulas = formulas!(p, {
+        // Formulas only subtract.
+        define AgainstRadS([-TAU / 60.0] * RunRpm * PolePairs),
+        define ReactanceOhm(AgainstRadS * L),
+        define EmfV(AgainstRadS * Flux),
+        number bus(R - ReactanceOhm * LimitA - EmfV * [SUPPLY] / UnitV),
+    });
+    formulas.number()
 }
 
 fn attempt(p: &Si, place: &mut start::Config) {
