@@ -1,6 +1,8 @@
 """Ten dangerous faults, on the flashed image and in the emulator: the same reactions at the same times.
 
-Both have the same plant and fault; the rotor's angle at the fault differs, since the chip boots.
+Both have the same plant and fault; the rotor's angle at the fault differs, since the chip boots. In the emulator the
+fault therefore comes at four angles, a quarter of an electrical turn apart: over a turn the power after a shorted low
+side differs by 7 %.
 """
 
 import json
@@ -36,8 +38,12 @@ WINDOWS_S = {"before": (-0.01, 0.0), "at once": (0.0, 0.002), "soon": (0.002, 0.
 has taken half of the earlier power for longer."""
 
 
-def written(path, moment: str, fault: str) -> None:
-    at_s = FAULT_S[moment]
+POLE_PAIRS = 12
+ANGLES = 4
+
+
+def written(path, moment: str, fault: str, later_s: float = 0.0) -> None:
+    at_s = FAULT_S[moment] + later_s
     throttle = [(0.0, 0.0), (OPENS_S, {HALF: 0.5, FULL: 1.0}[moment])]
     parts = [f'[bench]\nduration_s = {at_s + 0.21}\nplant = "switching"']
     parts += [f"[[signal]]\nat_s = {signal_s}\nthrottle = {value}" for signal_s, value in throttle]
@@ -56,14 +62,26 @@ def on_board(path) -> dict:
     return json.loads(ended.stdout)
 
 
+def in_emulator(path, moment: str, fault: str) -> list[dict]:
+    """Returns the windows of a fault at each angle."""
+    plays = []
+    later_s = 0.0
+    for _ in range(ANGLES):
+        written(path, moment, fault, later_s)
+        _, summary = scenario(path)
+        plays.append(windows_of(summary))
+        later_s += 60.0 / (plays[0]["before"]["rpm_mean"] * POLE_PAIRS * ANGLES)
+    return plays
+
+
 @pytest.mark.parametrize("name", CELLS)
 def test_the_image_does_at_a_fault_what_the_emulator_does(name, tmp_path):
     moment, fault = CELLS[name]
     path = tmp_path / "fault.toml"
     written(path, moment, fault)
     board = windows_of(on_board(path))
-    _, summary = scenario(path)
-    emulator = windows_of(summary)
+    plays = in_emulator(path, moment, fault)
+    emulator = plays[0]
     for window in WINDOWS_S:
         seen, wanted = board[window], emulator[window]
         assert seen["rpm_mean"] == pytest.approx(wanted["rpm_mean"], rel=0.005), window
@@ -72,5 +90,8 @@ def test_the_image_does_at_a_fault_what_the_emulator_does(name, tmp_path):
             allowed_w = 0.35 * abs(emulator["before"]["p_motor_w"])
             assert seen["p_motor_w"] == pytest.approx(wanted["p_motor_w"], abs=allowed_w)
         else:
-            assert seen["p_motor_w"] == pytest.approx(wanted["p_motor_w"], rel=0.05, abs=0.5), window
+            powers_w = [play[window]["p_motor_w"] for play in plays]
+            # The same if it lies between those of the angles.
+            nearest_w = min(max(seen["p_motor_w"], min(powers_w)), max(powers_w))
+            assert seen["p_motor_w"] == pytest.approx(nearest_w, rel=0.03, abs=0.5), window
             assert abs(seen["current_max_a"] - wanted["current_max_a"]) < 0.2 * wanted["current_max_a"] + 0.5, window
