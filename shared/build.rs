@@ -16,6 +16,10 @@ use table::{Kind, ParamId, TABLE};
 #[path = "src/checksum.rs"]
 mod checksum;
 
+#[allow(dead_code, unreachable_pub, reason = "as for the table")]
+#[path = "src/parts.rs"]
+mod parts;
+
 #[allow(
     dead_code,
     unreachable_pub,
@@ -31,6 +35,7 @@ fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-changed=src/params/table.rs");
     println!("cargo::rerun-if-changed=src/checksum.rs");
+    println!("cargo::rerun-if-changed=src/parts.rs");
     let folder = env::var_os("OUT_DIR").expect("cargo sets it");
     let folder = Path::new(&folder);
     let parameters = parameters();
@@ -63,7 +68,14 @@ fn parameter(id: ParamId) -> String {
     fields.text("name", entry.name);
     fields.text("type", "Float");
     fields.text("shortDesc", text.description);
-    fields.text("group", group(entry.name));
+    fields.text(
+        "group",
+        if text.is_used() {
+            group(entry.name)
+        } else {
+            "Not in this image"
+        },
+    );
     if !text.unit.is_empty() {
         fields.text("units", text.unit);
     }
@@ -91,7 +103,8 @@ fn parameter(id: ParamId) -> String {
             fields.text("description", meaning);
             fields.object()
         };
-        let choices: Vec<_> = text.choices.iter().map(choice).collect();
+        let here = |(value, _): &&(u8, &str)| !id.lacks(f32::from(*value));
+        let choices: Vec<_> = text.choices.iter().filter(here).map(choice).collect();
         fields.bare("values", format_args!("[{}]", choices.join(",")));
     }
     fields.object()

@@ -203,8 +203,8 @@ impl Rig {
             self.applied
         };
         let halves = match delay {
-            Delay::None => [bridge, bridge],
-            Delay::Half => [before, bridge],
+            Delay::None(_) => [bridge, bridge],
+            Delay::Half(_) => [before, bridge],
             Delay::One => [before, before],
         };
         self.applied = bridge;

@@ -52,6 +52,7 @@ pub mod input;
 pub mod math;
 pub mod mavlink;
 pub mod params;
+pub mod parts;
 pub mod protection;
 pub mod record;
 pub mod setpoint;

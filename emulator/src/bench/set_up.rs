@@ -2,6 +2,7 @@
 
 use siskin_control::control::delay::Delay;
 use siskin_control::drive::Config;
+use siskin_control::parts;
 
 use super::choice::Choice;
 use super::load::LoadTable;
@@ -91,7 +92,7 @@ impl Bench {
     pub(crate) fn observed(&self, config: Config) -> Config {
         match self.position {
             Position::Observer => config,
-            Position::Ideal => config.with_position_given(),
+            Position::Ideal => config.with_position_given(parts::Bench::HERE),
         }
     }
 }

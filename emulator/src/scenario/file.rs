@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::Deserialize;
 use siskin_control::control::delay::Delay;
 use siskin_control::params::ParamId;
+use siskin_control::parts;
 use toml::{Table, Value};
 
 use super::ScenarioError;
@@ -267,8 +268,8 @@ impl BenchTable {
             1e6,
         )?;
         let delay = match self.delay_periods {
-            0.0 => Delay::None,
-            0.5 => Delay::Half,
+            0.0 => Delay::None(parts::Bench::HERE),
+            0.5 => Delay::Half(parts::Bench::HERE),
             1.0 => Delay::One,
             other => return Err(ScenarioError::Delay(other)),
         };

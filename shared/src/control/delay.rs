@@ -1,16 +1,17 @@
 //! The delay from a sample to the voltage computed from it.
 
+use crate::parts;
 use crate::units::{Angle, Speed, Voltage};
 
 /// Control periods from a sample to the voltage computed from it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Delay {
     /// No delay.
-    #[default]
-    None,
+    None(parts::Bench),
     /// Half a period.
-    Half,
+    Half(parts::Bench),
     /// One period: one preloaded duty update per period.
+    #[default]
     One,
 }
 
@@ -20,8 +21,8 @@ impl Delay {
     pub fn advance(self, speed: Speed) -> Angle {
         let half = speed.over_half_period();
         match self {
-            Self::None => half,
-            Self::Half => speed.over_period(),
+            Self::None(_) => half,
+            Self::Half(_) => speed.over_period(),
             Self::One => speed.over_period().wrapping_add(half),
         }
     }
@@ -30,8 +31,8 @@ impl Delay {
     /// command.
     pub fn applied(self, now: Voltage, before: Voltage) -> Voltage {
         match self {
-            Self::None => now,
-            Self::Half => (now + before) >> 1,
+            Self::None(_) => now,
+            Self::Half(_) => (now + before) >> 1,
             Self::One => before,
         }
     }

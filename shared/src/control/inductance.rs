@@ -7,6 +7,7 @@
 use fixed::types::{I0F32, I2F30};
 
 use crate::math::{Gain, Multiplier, Number, divide};
+use crate::parts;
 use crate::trace::traced;
 use crate::units::{Current, Flux};
 
@@ -46,8 +47,9 @@ impl Factor {
 }
 
 /// Coefficients for one sample period.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Config {
+    part: parts::AdaptL,
     /// Half the peak-to-peak height of the square wave along d.
     pub amplitude: Current,
     /// Half a wave, in periods.
@@ -56,6 +58,19 @@ pub struct Config {
     pub mean_periods: u32,
     /// From Δφ̂/Δi_d to the change of the factor: the gain of a step over the stated L.
     pub gain: Gain<Flux, I2F30>,
+}
+
+impl Config {
+    /// Creates it without coefficients.
+    pub fn new(part: parts::AdaptL) -> Self {
+        Self {
+            part,
+            amplitude: Current::default(),
+            half_periods: 0,
+            mean_periods: 0,
+            gain: Gain::default(),
+        }
+    }
 }
 
 traced! {

@@ -8,6 +8,7 @@ use fixed::types::{I0F32, I1F31, I8F24};
 use super::dead_time;
 use super::transform::{AlphaBeta, Dq, PhaseOrder, phases_in};
 use crate::math::{Held, Multiplier, Quantity, Real, SQRT_3, TopProduct, TopSum, other_leg};
+use crate::parts;
 use crate::trace::traced;
 use crate::units::dimension::Volt;
 use crate::units::{
@@ -21,7 +22,7 @@ pub enum Modulation {
     /// Midway between the highest and the lowest phase: full line-to-line voltage.
     SpaceVector,
     /// Half the supply: 15 % less voltage, and less harmonic content in the common mode.
-    Sine,
+    Sine(parts::Sine),
 }
 
 /// The modulator's limits.
@@ -44,7 +45,7 @@ impl Config {
         let (longest, readable, centred) = match modulation {
             // The highest phase is at half the largest duty plus at most √3/2 of the vector.
             Modulation::SpaceVector => (1.0 / SQRT_3, (2.0 * window - duty_max) / SQRT_3, -1),
-            Modulation::Sine => (0.5, window - 0.5 * duty_max, 0),
+            Modulation::Sine(_) => (0.5, window - 0.5 * duty_max, 0),
         };
         Self {
             centred: I1F31::from_bits(centred),
@@ -335,7 +336,7 @@ mod tests {
 
     #[test]
     fn the_duties_make_the_vector_up_to_the_limit() {
-        for modulation in [Modulation::SpaceVector, Modulation::Sine] {
+        for modulation in [Modulation::SpaceVector, Modulation::Sine(parts::Sine::HERE)] {
             let config = config(modulation, 0.95);
             for bus in [0.2, 0.98, 5.0] {
                 let supply = Supply::new(&config, Voltage::from_num(bus), Voltage::ZERO);
@@ -397,7 +398,7 @@ mod tests {
 
     #[test]
     fn compensation_is_added() {
-        let config = config(Modulation::Sine, 0.99);
+        let config = config(Modulation::Sine(parts::Sine::HERE), 0.99);
         let supply = Supply::new(&config, Voltage::ONE, Voltage::ZERO);
         let dead_time = dead_time::Config {
             duty: I2F30::from_num(0.01),

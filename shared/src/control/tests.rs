@@ -13,6 +13,7 @@ use super::regulator::Feedback;
 use super::transform::Dq;
 use crate::drive::Config;
 use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
+use crate::parts;
 use crate::units::{Angle, Current, InverseFlux, Speed, Torque, Voltage, WideVoltage};
 
 mod inductance;
@@ -20,6 +21,9 @@ mod motor;
 mod outer;
 mod regulators;
 mod speed;
+
+const NONE: Delay = Delay::None(parts::Bench::HERE);
+const HALF: Delay = Delay::Half(parts::Bench::HERE);
 
 const R: f64 = 0.108;
 const L: f64 = 30.6e-6;
@@ -48,7 +52,7 @@ fn config_with(changes: &[(ParamId, f32)]) -> Config {
         params.set(*id, *value).expect("in range");
     }
     let board = Board {
-        delay: Delay::None,
+        delay: NONE,
         ..Board::BENCH
     };
     build(&params, &board).expect("it makes a drive")
@@ -57,7 +61,7 @@ fn config_with(changes: &[(ParamId, f32)]) -> Config {
 /// The adaptive back-EMF observer of `CTL_OBSERVER` 0.
 fn published(config: &Config) -> back_emf::Config {
     match &config.observer {
-        observer::Config::BackEmf(back_emf) => back_emf.clone(),
+        observer::Config::BackEmf(back_emf, _) => back_emf.clone(),
         other => panic!("{other:?}"),
     }
 }
@@ -240,7 +244,7 @@ fn the_voltage_between_two_samples_follows_the_delay() {
         assert_eq!(state.u_before, now);
         state.i.d.to_num::<f64>()
     };
-    let (none, half, one) = (run(Delay::None), run(Delay::Half), run(Delay::One));
+    let (none, half, one) = (run(NONE), run(HALF), run(Delay::One));
     assert!((none / one - 0.5).abs() < 1e-6 && (half / one - 0.75).abs() < 1e-6);
     let ahead = Delay::One.advance(Speed::from_num(0.1)).to_num::<f64>();
     assert!((ahead - 0.15).abs() < 1e-9);
@@ -248,7 +252,7 @@ fn the_voltage_between_two_samples_follows_the_delay() {
 
 #[test]
 fn a_rotor_that_is_caught_without_current_is_predicted_without_current() {
-    for delay in [Delay::None, Delay::Half, Delay::One] {
+    for delay in [NONE, HALF, Delay::One] {
         let units = Units(config_with(&[(ParamId::CtlObserver, 0.0)]));
         let config = back_emf::Config {
             delay,

@@ -11,6 +11,7 @@ use crate::control::{
     torque,
 };
 use crate::math::{Gain, Multiplier};
+use crate::parts;
 use crate::protection;
 use crate::units::{AdcCounts, Current, Duty, Scale, Speed, Voltage, WideVoltage};
 
@@ -133,9 +134,9 @@ pub fn put_default<T: Default>(place: &mut MaybeUninit<T>) -> &mut T {
 impl Config {
     /// Returns this drive with the rotor's position given by [`State::place`](crate::drive::State::place) instead
     /// of an observer. It starts from standstill without aligning the rotor.
-    pub fn with_position_given(self) -> Self {
+    pub fn with_position_given(self, part: parts::Bench) -> Self {
         Self {
-            observer: observer::Config::Given,
+            observer: observer::Config::Given(part),
             // 0.9 s, as for a motor with sensors: it begins Run at standstill.
             slow_periods: self.proven_periods.saturating_mul(3),
             ..self

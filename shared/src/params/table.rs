@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use crate::parts::Part;
+
 /// The kind of a parameter: its values, and where they come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -85,6 +87,15 @@ pub struct Text {
     pub choices: &'static [(u8, &'static str)],
     /// True if a change takes effect at the next start.
     pub restart: bool,
+    /// The parts that use it, if only some do.
+    pub parts: &'static [Part],
+}
+
+impl Text {
+    /// Returns true unless this build lacks all parts that use the parameter.
+    pub fn is_used(&self) -> bool {
+        self.parts.is_empty() || self.parts.iter().any(|part| part.is_here())
+    }
 }
 
 /// A parameter that is one of a few choices.
@@ -92,7 +103,7 @@ pub trait Choice: Copy {
     /// The parameter.
     const PARAM: ParamId;
 
-    /// Returns the choice with this number; the table's range holds no other.
+    /// Returns the choice with this number; in place of one whose part this build lacks, the one that is then in force.
     fn of(number: u8) -> Self;
 
     /// Returns its number.
@@ -123,11 +134,21 @@ macro_rules! is_at_restart {
     };
 }
 
+macro_rules! is_here {
+    () => {
+        true
+    };
+    ($part:ident) => {
+        Part::$part.is_here()
+    };
+}
+
 macro_rules! parameters {
     ($($key:literal $id:ident $name:literal $unit:literal $kind:ident
        $min:literal .. $max:literal = $default:literal $($word:ident)* $description:literal
+       $(in $($user:ident)|+)?
        $($value:literal $choice:literal)*
-       $(one of $($number:literal $variant:ident $meaning:literal)+)?;)*) => {
+       $(one of $($number:literal $variant:ident $meaning:literal $(in $part:ident)?)+)?;)*) => {
         /// Names a row of [`TABLE`]; its order is the order on MAVLink.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
@@ -162,12 +183,18 @@ macro_rules! parameters {
                 description: $description,
                 choices: &[$(($value, $choice),)* $($(($number, $meaning)),+)?],
                 restart: is_at_restart!($($word)*),
+                parts: &[$($(Part::$user),+)?],
             },
         )*];
 
+        /// The choices that need a part: parameter, number and part.
+        const PARTED: &[(ParamId, u8, Part)] = &[
+            $($($($((ParamId::$id, $number, Part::$part),)?)+)?)*
+        ];
+
         /// The parameters that are a choice of few, each by its own name.
         pub mod choice {
-            use super::{Choice, ParamId};
+            use super::{Choice, ParamId, Part};
 
             $($(
                 #[doc = $description]
@@ -181,6 +208,26 @@ macro_rules! parameters {
                 }
 
                 impl $id {
+                    /// In force in place of a choice that this build lacks: the default, or else the first one.
+                    const SUBSTITUTE: Self = {
+                        let choices = [$((Self::$variant, is_here!($($part)?))),+];
+                        let (mut found, mut i) = (choices[0].0, choices.len());
+                        while i > 0 {
+                            i -= 1;
+                            if choices[i].1 {
+                                found = choices[i].0;
+                            }
+                        }
+                        i = 0;
+                        while i < choices.len() {
+                            if choices[i].1 && choices[i].0 as u8 == $default as u8 {
+                                found = choices[i].0;
+                            }
+                            i += 1;
+                        }
+                        found
+                    };
+
                     /// The parameter and the value that choose this.
                     pub const fn setting(self) -> (ParamId, f32) {
                         (ParamId::$id, self as u8 as f32)
@@ -192,8 +239,8 @@ macro_rules! parameters {
 
                     fn of(number: u8) -> Self {
                         match number {
-                            $($number => Self::$variant,)+
-                            _ => [$(Self::$variant),+][0],
+                            $($number if is_here!($($part)?) => Self::$variant,)+
+                            _ => Self::SUBSTITUTE,
                         }
                     }
 
@@ -211,6 +258,17 @@ macro_rules! parameters {
             /// This parameter's words for a person.
             pub const fn text(self) -> &'static Text {
                 &TEXTS[self as usize]
+            }
+
+            /// Returns the part that a choice needs, if any.
+            pub fn part(self, number: u8) -> Option<Part> {
+                let mut parted = PARTED.iter();
+                parted.find(|(id, choice, _)| (*id, *choice) == (self, number)).map(|found| found.2)
+            }
+
+            /// Returns true for a choice whose part this build lacks.
+            pub fn lacks(self, value: f32) -> bool {
+                self.part(value as u8).is_some_and(|part| !part.is_here())
             }
         }
     };
@@ -264,27 +322,27 @@ parameters! {
             2 Automatic "field-oriented, or six-step in voltage mode while R, L or flux is not known";
     22 CtlObserver "CTL_OBSERVER" "" Whole 0.0..3.0 = 3.0
         "Position observer" one of
-            0 BackEmf "adaptive back-EMF"
-            1 FluxCrossings "flux crossings"
-            2 Hall "Hall"
+            0 BackEmf "adaptive back-EMF" in BackEmf
+            1 FluxCrossings "flux crossings" in FluxCrossings
+            2 Hall "Hall" in Hall
             3 Compensated "compensated flux with PLL";
     23 CtlRegulator "CTL_REGULATOR" "" Whole 0.0..2.0 = 1.0
         "Current regulator" one of
-            0 ObserverBased "observer-based"
+            0 ObserverBased "observer-based" in BackEmf
             1 Synchronous "synchronous"
-            2 Modified "modified synchronous";
+            2 Modified "modified synchronous" in Modified;
     24 CtlModulation "CTL_MODULATION" "" Whole 0.0..1.0 = 0.0
         "Modulation" one of
             0 SpaceVector "space vector"
-            1 Sine "sine";
+            1 Sine "sine" in Sine;
     25 CtlObsCure "CTL_OBS_CURE" "" Whole 0.0..1.0 = 0.0
-        "Form of the adaptive back-EMF observer" one of
+        "Form of the adaptive back-EMF observer" in BackEmf one of
             0 Published "as published"
             1 Cured "cured of its sensitivity to R, L";
     26 CtlAdaptL "CTL_ADAPT_L" "" Whole 0.0..1.0 = 0.0
-        "Adaptation of the inductance by a square wave of i_d" one of
+        "Adaptation of the inductance by a square wave of i_d" in AdaptL one of
             0 Off "off"
-            1 On "on";
+            1 On "on" in AdaptL;
     27 CtlRpmMax "CTL_RPM_MAX" "rpm" Real 100.0..200000.0 = 6000.0
         "Mechanical speed at full throttle in speed mode";
     28 CtlRpmMin "CTL_RPM_MIN" "rpm" FromMotor 100.0..200000.0 = 300.0
@@ -296,26 +354,29 @@ parameters! {
     31 CtlBwSpdHz "CTL_BW_SPD_HZ" "Hz" FromMotor 0.1..200.0 = 0.0 live
         "Bandwidth of the speed loop; 0 follows from the motor";
     32 CtlAe "CTL_AE" "" Real 0.0..0.95 = 0.5
-        "Observers 1 and 2: share of the extrapolated angle that a crossing leaves, at high speed";
+        "Observers 1 and 2: share of the extrapolated angle that a crossing leaves, at high speed"
+        in FluxCrossings | Hall;
     33 CtlPosN "CTL_POS_N" "" Whole 1.0..4.0 = 1.0
-        "Observers 1 and 2: electrical turns over which the speed is measured";
+        "Observers 1 and 2: electrical turns over which the speed is measured"
+        in FluxCrossings | Hall;
     34 CtlFluxForm "CTL_FLUX_FORM" "" Whole 0.0..3.0 = 1.0
-        "Flux integrators" one of
+        "Flux integrators" in FluxCrossings | Hall one of
             0 FirstOrder "first order, limits as measured"
             1 SecondOrder "second order, limits as measured"
             2 FirstOrderStated "first order, limits as stated"
             3 SecondOrderStated "second order, limits as stated";
     35 CtlHall "CTL_HALL" "" Whole 0.0..1.0 = 1.0
-        "Hall observer" one of
+        "Hall observer" in Hall one of
             0 Alone "sensors alone"
-            1 Merged "merged with the flux crossings";
+            1 Merged "merged with the flux crossings" in FluxCrossings;
     36 CtlSpeed "CTL_SPEED" "" Whole 0.0..2.0 = 0.0
         "Speed loop" one of
             0 Inertia "with feed-forward of the inertia"
-            1 Propeller "PI with feed-forward of CTL_FF_A"
+            1 Propeller "PI with feed-forward of CTL_FF_A" in Propeller
             2 Pi "PI";
     37 CtlFfA "CTL_FF_A" "A" Real 0.0..200.0 = 8.4 live
-        "Steady current at CTL_RPM_MAX, fed forward with the square of the speed if CTL_SPEED is 1";
+        "Steady current at CTL_RPM_MAX, fed forward with the square of the speed if CTL_SPEED is 1"
+        in Propeller;
     40 PwmFreqHz "PWM_FREQ_HZ" "Hz" Real 8000.0..60000.0 = 24000.0 restart
         "PWM frequency; the control runs once a period";
     41 PwmDeadtimeNs "PWM_DEADTIME_NS" "ns" Real 0.0..3000.0 = 500.0 restart

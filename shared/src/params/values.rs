@@ -72,14 +72,20 @@ impl Params {
         self.values[id as usize]
     }
 
-    /// Returns the value of a parameter that is a choice, as its type.
+    /// Returns the choice in force of a parameter: the value, or what stands in for one whose part this build lacks.
     pub fn choice<C: Choice>(&self) -> C {
         C::of(self.number(C::PARAM))
     }
 
-    /// Returns true if a parameter has this choice.
+    /// Returns true if a parameter has this choice in force.
     pub fn chosen<C: Choice>(&self, choice: C) -> bool {
-        self.number(C::PARAM) == choice.number()
+        self.choice::<C>().number() == choice.number()
+    }
+
+    /// Returns the first parameter whose choice this build lacks: another image has stored it, and it is kept.
+    pub fn lacking(&self) -> Option<ParamId> {
+        let mut all = ParamId::ALL.into_iter();
+        all.find(|id| id.lacks(self.get(*id)))
     }
 
     /// Returns a small whole number. Never inlined: the conversion would be repeated at every choice.

@@ -15,10 +15,11 @@ use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 pub use file::{FaultSeen, PeriodSeen, Recorded};
 
 use crate::drive::{Bridge, Config, Sample, State};
+use crate::parts::Part;
 use crate::units::{AdcCounts, Duty};
 
-/// True if this program keeps a record: the feature `record`.
-pub const KEPT: bool = cfg!(feature = "record");
+/// True if this program keeps a record.
+pub const KEPT: bool = Part::Record.is_here();
 
 /// Control periods kept.
 pub const PERIODS: usize = 64;

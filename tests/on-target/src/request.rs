@@ -14,7 +14,7 @@ pub const SET_UP_WORDS: usize = TABLE.len() + BOARD_WORDS;
 /// Words per period.
 pub const PERIOD_WORDS: usize = 9;
 
-const BOARD_WORDS: usize = 9;
+const BOARD_WORDS: usize = 8;
 
 /// Returns the parameters in the table's order, then the board.
 pub fn set_up(params: &Params, board: &Board) -> [u32; SET_UP_WORDS] {
@@ -25,7 +25,8 @@ pub fn set_up(params: &Params, board: &Board) -> [u32; SET_UP_WORDS] {
         current_range_a,
         terminal_v_per_count,
         shunts,
-        delay,
+        // A chip has no other than one period.
+        delay: _,
         low_side_on_s,
         refresh_s,
         charge_s,
@@ -44,7 +45,6 @@ pub fn set_up(params: &Params, board: &Board) -> [u32; SET_UP_WORDS] {
         refresh_s.to_bits(),
         charge_s.to_bits(),
         shunts as u32,
-        delay as u32,
     ]);
     words
 }
@@ -72,11 +72,7 @@ pub fn read_set_up(words: &[u32; SET_UP_WORDS]) -> (Params, Board) {
         } else {
             Shunts::Three
         },
-        delay: match rest[8] {
-            word if word == Delay::None as u32 => Delay::None,
-            word if word == Delay::Half as u32 => Delay::Half,
-            _ => Delay::One,
-        },
+        delay: Delay::One,
         least_dead_time: LeastDeadTime::NONE,
     };
     (params, board)

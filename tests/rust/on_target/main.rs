@@ -12,6 +12,8 @@ mod counts;
 mod record;
 mod target;
 
+use std::path::Path;
+
 use counts::Counts;
 use record::{Act, Run};
 use siskin_control::drive::Phase;
@@ -81,9 +83,9 @@ const HOP: [(f64, Act); 7] = [
 ];
 
 /// Records a run, replays it on the chip, prints the counts, and returns them if all words agree.
-fn replay(name: &str, changes: &[(ParamId, f32)], acts: &[(f64, Act)]) -> Counts {
+fn replay(program: &Path, name: &str, changes: &[(ParamId, f32)], acts: &[(f64, Act)]) -> Counts {
     let run = Run::record(changes, acts);
-    let answer = target::replay(&target::STEP, name, &run.request);
+    let answer = target::replay(program, name, &run.request);
     let instructions = run.compare(&answer);
     let counts = Counts::new(&run.labels, &instructions);
     println!(
@@ -95,7 +97,7 @@ fn replay(name: &str, changes: &[(ParamId, f32)], acts: &[(f64, Act)]) -> Counts
 
 #[test]
 fn the_default_drive_has_the_same_bits_and_a_short_period() {
-    let counts = replay("default", &[], &FLIGHT);
+    let counts = replay(&target::STEP, "default", &[], &FLIGHT);
     for phase in Phase::ALL {
         assert!(counts.has(phase), "the run is without {phase:?}");
     }
@@ -118,7 +120,12 @@ fn the_whole_interrupt_publishes_the_same_and_is_short() {
 fn every_observer_has_the_same_bits() {
     for observer in [0.0, 1.0, 2.0] {
         let name = format!("observer-{observer}");
-        replay(&name, &[(ParamId::CtlObserver, observer)], &HOP);
+        replay(
+            &target::PAPERS,
+            &name,
+            &[(ParamId::CtlObserver, observer)],
+            &HOP,
+        );
     }
 }
 
@@ -126,12 +133,17 @@ fn every_observer_has_the_same_bits() {
 fn every_regulator_has_the_same_bits() {
     for regulator in [0.0, 2.0] {
         let name = format!("regulator-{regulator}");
-        replay(&name, &[(ParamId::CtlRegulator, regulator)], &HOP);
+        replay(
+            &target::PAPERS,
+            &name,
+            &[(ParamId::CtlRegulator, regulator)],
+            &HOP,
+        );
     }
 }
 
 #[test]
 fn the_six_step_drive_has_the_same_bits() {
     let changes = [(ParamId::CtlDrive, 1.0), (ParamId::PwmFreqHz, 40_000.0)];
-    replay("six-step", &changes, &HOP);
+    replay(&target::STEP, "six-step", &changes, &HOP);
 }

@@ -12,16 +12,20 @@ const CHIP: &str = "thumbv7em-none-eabihf";
 /// Longest time for a run, s: 10 s of the drive take a few.
 const TIMEOUT: &str = "120";
 
-/// The control step alone.
+/// The control step alone, with the parts for flying.
 pub(crate) static STEP: LazyLock<PathBuf> =
-    LazyLock::new(|| build("siskin-step-on-target", "chip"));
+    LazyLock::new(|| build("siskin-step-on-target", "chip,siskin-control/flight"));
+
+/// The control step alone, with all of the papers.
+pub(crate) static PAPERS: LazyLock<PathBuf> =
+    LazyLock::new(|| build("siskin-step-on-target", "chip,siskin-control/papers"));
 
 /// The whole interrupt.
 pub(crate) static INTERRUPT: LazyLock<PathBuf> =
     LazyLock::new(|| build("siskin-interrupt-on-target", "interrupt"));
 
-/// Builds a program for the chip.
-fn build(program: &str, feature: &str) -> PathBuf {
+/// Builds a program for the chip, under a name that tells its features.
+fn build(program: &str, features: &str) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let target = Path::new(env!("CARGO_TARGET_TMPDIR"))
         .parent()
@@ -34,14 +38,18 @@ fn build(program: &str, feature: &str) -> PathBuf {
             "-p",
             "siskin-on-target",
             "--features",
-            feature,
+            features,
             "--bin",
             program,
         ])
         .status()
         .expect("cargo runs");
     assert!(built.success(), "the chip's program does not build");
-    target.join(CHIP).join("release").join(program)
+    let folder = target.join(CHIP).join("release");
+    let (_, parts) = features.rsplit_once('/').unwrap_or(("", features));
+    let kept = folder.join(format!("{program}-{parts}"));
+    fs::copy(folder.join(program), &kept).expect("it has been built");
+    kept
 }
 
 /// Has a program for the chip run a request's periods, and returns its answer.

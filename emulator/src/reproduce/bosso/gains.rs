@@ -73,8 +73,8 @@ impl Gains {
         let config = build(&params, &Sensing::default().board(Delay::One));
         let config = config.expect("the preset is the paper's drive");
         let (
-            observer::Config::BackEmf(observer),
-            regulator::Config::ObserverBased(regulator),
+            observer::Config::BackEmf(observer, _),
+            regulator::Config::ObserverBased(regulator, _),
             speed::Law::Nested(speed),
         ) = (&config.observer, &config.regulator, &config.speed.law)
         else {

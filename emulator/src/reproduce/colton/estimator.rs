@@ -11,6 +11,7 @@ use siskin_control::control::observer::flux_linkage::{self, HighPass};
 use siskin_control::control::observer::{crossing, position};
 use siskin_control::math::Gain;
 use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
+use siskin_control::parts;
 use siskin_control::units::{Angle, Current, FLUX_NOMINAL, Speed, Voltage};
 
 use crate::rig::Bench;
@@ -62,7 +63,7 @@ pub(super) fn config(a_e: f64, compensates: bool) -> edges::Config {
         unreachable!("CTL_OBSERVER is 1");
     };
     edges::Config {
-        sensors: Sensors::None,
+        sensors: Sensors::None(parts::FluxCrossings::HERE),
         flux: flux_linkage::Config {
             forget: Gain::ZERO,
             corner: Speed::ZERO,

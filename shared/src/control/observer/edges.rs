@@ -7,23 +7,23 @@ use super::crossing::{self, Crossing};
 use super::flux_linkage;
 use super::hall::{self, Step};
 use super::position::{self, Periods};
+use crate::parts;
 use crate::trace::traced;
 use crate::units::{Angle, Current, Speed, Voltage};
 
 /// The source of the edges.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sensors {
     /// Flux crossings; no Hall sensors.
-    #[default]
-    None,
+    None(parts::FluxCrossings),
     /// Hall sensors alone; voltages and currents are ignored.
-    Hall,
+    Hall(parts::Hall),
     /// Hall sensors at standstill and low speed, flux crossings above, which also replace failed sensors.
-    Merged,
+    Merged(parts::Hall, parts::FluxCrossings),
 }
 
 /// Coefficients of the estimation.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// The source of the edges.
     pub sensors: Sensors,
@@ -39,6 +39,21 @@ pub struct Config {
     pub flux_above: Speed,
     /// Speed below which the Hall sensors take over again.
     pub hall_below: Speed,
+}
+
+impl Config {
+    /// Creates it without coefficients.
+    pub fn new(sensors: Sensors) -> Self {
+        Self {
+            sensors,
+            flux: flux_linkage::Config::default(),
+            crossing: crossing::Config::default(),
+            position: position::Config::default(),
+            hall: hall::Config::default(),
+            flux_above: Speed::ZERO,
+            hall_below: Speed::ZERO,
+        }
+    }
 }
 
 traced! {
@@ -98,12 +113,12 @@ pub fn estimate(
 ) -> Position {
     position::advance(&mut state.position);
     let step = match config.sensors {
-        Sensors::None => None,
-        Sensors::Hall | Sensors::Merged => hall::read(&config.hall, &mut state.hall, hall),
+        Sensors::None(_) => None,
+        Sensors::Hall(_) | Sensors::Merged(..) => hall::read(&config.hall, &mut state.hall, hall),
     };
     let crossing = match config.sensors {
-        Sensors::Hall => None,
-        Sensors::None | Sensors::Merged => flux_crossing(config, state, v, i),
+        Sensors::Hall(_) => None,
+        Sensors::None(_) | Sensors::Merged(..) => flux_crossing(config, state, v, i),
     };
     select_source(config, state);
     match (state.source, step, crossing) {
@@ -155,14 +170,14 @@ fn flux_crossing(
 fn select_source(config: &Config, state: &mut State) {
     let omega = state.position.omega;
     let wanted = match (config.sensors, state.source) {
-        (Sensors::None, _) => Source::Flux,
-        (Sensors::Hall, _) => Source::Hall,
-        (Sensors::Merged, _) if state.hall.fault => Source::Flux,
-        (Sensors::Merged, Source::Hall) => {
+        (Sensors::None(_), _) => Source::Flux,
+        (Sensors::Hall(_), _) => Source::Hall,
+        (Sensors::Merged(..), _) if state.hall.fault => Source::Flux,
+        (Sensors::Merged(..), Source::Hall) => {
             let ready = omega >= config.flux_above && state.crossing.trusted();
             if ready { Source::Flux } else { Source::Hall }
         }
-        (Sensors::Merged, Source::Flux) => {
+        (Sensors::Merged(..), Source::Flux) => {
             let keeps = omega >= config.hall_below && state.crossing.tracks;
             if keeps { Source::Flux } else { Source::Hall }
         }
@@ -236,15 +251,15 @@ pub fn begin(config: &Config, state: &mut State, theta: Angle, omega: Speed, i: 
     let lead = flux_linkage::lead(&config.flux, omega);
     crossing::begin(&mut state.crossing, theta.wrapping_add(lead));
     state.source = match config.sensors {
-        Sensors::Merged if omega < config.flux_above && !state.hall.fault => Source::Hall,
-        Sensors::Hall => Source::Hall,
-        Sensors::None | Sensors::Merged => Source::Flux,
+        Sensors::Merged(..) if omega < config.flux_above && !state.hall.fault => Source::Hall,
+        Sensors::Hall(_) => Source::Hall,
+        Sensors::None(_) | Sensors::Merged(..) => Source::Flux,
     };
 }
 
 /// Sets the rotor to rest in the sector that the Hall sensors show. Returns false if they cannot be trusted.
 pub fn begin_at_rest(config: &Config, state: &mut State, hall: u8) -> bool {
-    if config.sensors == Sensors::None {
+    if matches!(config.sensors, Sensors::None(_)) {
         return false;
     }
     let Some(sector) = hall::read_at_rest(&mut state.hall, hall) else {

@@ -18,22 +18,28 @@ use super::inductance::Factor;
 use super::regulator::Feedback;
 use super::transform::{AlphaBeta, Dq, phases};
 use crate::math::{EIGHTH_PI, SinCos, TopProduct};
+use crate::parts;
 use crate::trace::Trace;
 use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, Speed, Voltage, WideVoltage, wide};
 pub use estimate::{Estimate, Input, SlowEstimate};
 
 /// The selected observer (`CTL_OBSERVER`) and its coefficients.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Config {
     /// Adaptive back-EMF.
-    BackEmf(back_emf::Config),
+    BackEmf(back_emf::Config, parts::BackEmf),
     /// Crossings of the flux linkages, Hall sensors, or both.
     Edges(edges::Config),
     /// Compensated flux with a phase-locked loop.
     Compensated(compensated::Config),
     /// None: the caller supplies the rotor's position, see [`drive::State::place`](crate::drive::State::place).
-    #[default]
-    Given,
+    Given(parts::Bench),
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self::Compensated(compensated::Config::default())
+    }
 }
 
 /// The observers' states; only the selected one's changes.
@@ -74,7 +80,7 @@ impl Observer for Config {
     #[inline(never)]
     fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate {
         match self {
-            Self::BackEmf(config) => {
+            Self::BackEmf(config, _) => {
                 let (estimate, slow) =
                     back_emf::estimate(config, &mut state.back_emf, imposed, input.reference_step);
                 state.slow_estimate = slow;
@@ -98,7 +104,7 @@ impl Observer for Config {
             Self::Compensated(config) => {
                 compensated::estimate(config, &mut state.compensated, input, imposed)
             }
-            Self::Given => {
+            Self::Given(_) => {
                 let (estimate, slow) = given::estimate(&state.given, input.swapped);
                 state.slow_estimate = slow;
                 estimate
@@ -118,12 +124,12 @@ impl Observer for Config {
         inductance: Factor,
     ) -> Feedback {
         let (i_hat, h_hat) = match self {
-            Self::BackEmf(_) => {
+            Self::BackEmf(..) => {
                 let h = state.back_emf.h;
                 let (d, q) = (wide(h.d), wide(h.q));
                 (state.back_emf.i, Dq { d, q })
             }
-            Self::Edges(_) | Self::Given => (i, emf(omega, FLUX_NOMINAL)),
+            Self::Edges(_) | Self::Given(_) => (i, emf(omega, FLUX_NOMINAL)),
             Self::Compensated(config) => return config.feedback(state, (omega, i), inductance),
         };
         Feedback {
@@ -136,7 +142,7 @@ impl Observer for Config {
     }
 
     fn advance(&self, state: &mut State, fb: &Feedback, u: Dq<Voltage>) {
-        if let Self::BackEmf(config) = self {
+        if let Self::BackEmf(config, _) = self {
             back_emf::advance(config, &mut state.back_emf, fb, u);
         }
     }
@@ -176,7 +182,7 @@ impl Config {
     /// Returns true if [`Observer::advance`] has any effect: only the adaptive back-EMF observer works in the control's
     /// frame.
     pub fn works_in_frame(&self) -> bool {
-        matches!(self, Self::BackEmf(_))
+        matches!(self, Self::BackEmf(..))
     }
 }
 
@@ -199,13 +205,13 @@ pub fn schedule_gains(
 pub fn begin_at_rest(config: &Config, state: &mut State, frame: Angle, hall: u8) -> bool {
     state.clear(config);
     match config {
-        Config::BackEmf(config) => {
+        Config::BackEmf(config, _) => {
             state.back_emf = back_emf::begin(config, frame, Speed::ZERO);
             false
         }
         Config::Edges(config) => edges::begin_at_rest(config, &mut state.edges, hall),
         Config::Compensated(_) => false,
-        Config::Given => true,
+        Config::Given(_) => true,
     }
 }
 
@@ -228,10 +234,10 @@ fn emf(omega: Speed, flux: Flux) -> Dq<WideVoltage> {
 /// Returns φ̂, the rotor's flux along d.
 pub fn flux(config: &Config, state: &State) -> Flux {
     match config {
-        Config::BackEmf(_) => back_emf::flux(&state.back_emf),
+        Config::BackEmf(..) => back_emf::flux(&state.back_emf),
         Config::Edges(_) => state.edges.flux.amplitude,
         Config::Compensated(_) => state.compensated.phi,
-        Config::Given => FLUX_NOMINAL,
+        Config::Given(_) => FLUX_NOMINAL,
     }
 }
 
@@ -245,7 +251,7 @@ pub fn begin(
 ) {
     state.clear(config);
     match config {
-        Config::BackEmf(config) => state.back_emf = back_emf::begin(config, theta, omega),
+        Config::BackEmf(config, _) => state.back_emf = back_emf::begin(config, theta, omega),
         Config::Edges(config) => {
             // Its state is that of the previous sample.
             let before = theta.wrapping_sub(omega.over_period());
@@ -254,7 +260,7 @@ pub fn begin(
         Config::Compensated(config) => {
             compensated::begin(config, &mut state.compensated, (theta, omega), i);
         }
-        Config::Given => {}
+        Config::Given(_) => {}
     }
 }
 
@@ -262,7 +268,7 @@ pub fn begin(
 pub fn begin_aligned(config: &Config, state: &mut State, theta: Angle, i: AlphaBeta<Current>) {
     match config {
         // The former works in the frame that the start imposes, the latter needs no start.
-        Config::BackEmf(_) | Config::Given => {}
+        Config::BackEmf(..) | Config::Given(_) => {}
         Config::Edges(config) => {
             edges::begin(config, &mut state.edges, theta, Speed::ZERO, phases(i));
         }
@@ -281,7 +287,7 @@ pub fn take_over(
     omega_s: Speed,
 ) -> Option<Angle> {
     match config {
-        Config::BackEmf(config) => back_emf::take_over(config, &mut state.back_emf, omega_s),
+        Config::BackEmf(config, _) => back_emf::take_over(config, &mut state.back_emf, omega_s),
         Config::Edges(_) => {
             edges::locked_angle(&state.edges).map(|theta| theta.wrapping_sub(frame))
         }
@@ -289,7 +295,7 @@ pub fn take_over(
             compensated::locked_angle(&state.compensated).map(|theta| theta.wrapping_sub(frame))
         }
         // Never started by an imposed frame.
-        Config::Given => None,
+        Config::Given(_) => None,
     }
 }
 
@@ -299,7 +305,7 @@ impl State {
         self.slow_estimate = SlowEstimate::default();
         match config {
             // A start or a catch sets its whole state.
-            Config::BackEmf(_) | Config::Given => {}
+            Config::BackEmf(..) | Config::Given(_) => {}
             Config::Edges(_) => {
                 let hall = self.edges.hall.clone();
                 self.edges = edges::State {
@@ -322,10 +328,10 @@ impl State {
         } = self;
         slow_estimate.trace(out);
         match config {
-            Config::BackEmf(_) => back_emf.trace(out),
+            Config::BackEmf(..) => back_emf.trace(out),
             Config::Edges(_) => edges.trace(out),
             Config::Compensated(_) => compensated.trace(out),
-            Config::Given => given.trace(out),
+            Config::Given(_) => given.trace(out),
         }
     }
 }

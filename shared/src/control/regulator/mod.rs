@@ -11,6 +11,7 @@ pub mod synchronous;
 
 use super::inductance::Factor;
 use super::transform::Dq;
+use crate::parts;
 use crate::trace::traced;
 use crate::units::{Current, Speed, Voltage, WideVoltage, wide};
 pub use reference::{Feedback, Reference};
@@ -19,11 +20,11 @@ pub use reference::{Feedback, Reference};
 #[derive(Clone, Debug, PartialEq)]
 pub enum Config {
     /// First paper, (10).
-    ObserverBased(observer_based::Config),
+    ObserverBased(observer_based::Config, parts::BackEmf),
     /// Second paper, figure 10.
     Synchronous(synchronous::Config),
     /// Second paper, figure 11.
-    Modified(modified::Config),
+    Modified(modified::Config, parts::Modified),
 }
 
 impl Default for Config {
@@ -59,9 +60,9 @@ pub trait Regulator {
 impl Regulator for Config {
     fn voltage(&self, state: &State, reference: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
         let u = match self {
-            Self::ObserverBased(c) => c.voltage(&state.observer_based, reference, fb),
+            Self::ObserverBased(c, _) => c.voltage(&state.observer_based, reference, fb),
             Self::Synchronous(c) => return c.voltage(&state.synchronous, reference, fb),
-            Self::Modified(c) => c.voltage(&state.modified, reference, fb),
+            Self::Modified(c, _) => c.voltage(&state.modified, reference, fb),
         };
         Dq {
             d: wide(u.d),
@@ -71,17 +72,17 @@ impl Regulator for Config {
 
     fn integrate(&self, state: &mut State, reference: &Reference, fb: &Feedback) {
         match self {
-            Self::ObserverBased(c) => c.integrate(&mut state.observer_based, reference, fb),
+            Self::ObserverBased(c, _) => c.integrate(&mut state.observer_based, reference, fb),
             Self::Synchronous(c) => c.integrate(&mut state.synchronous, reference, fb),
-            Self::Modified(c) => c.integrate(&mut state.modified, reference, fb),
+            Self::Modified(c, _) => c.integrate(&mut state.modified, reference, fb),
         }
     }
 
     fn anti_windup(&self, state: &mut State, cut: Dq<WideVoltage>) {
         match self {
-            Self::ObserverBased(c) => c.anti_windup(&mut state.observer_based, cut),
+            Self::ObserverBased(c, _) => c.anti_windup(&mut state.observer_based, cut),
             Self::Synchronous(c) => c.anti_windup(&mut state.synchronous, cut),
-            Self::Modified(c) => c.anti_windup(&mut state.modified, cut),
+            Self::Modified(c, _) => c.anti_windup(&mut state.modified, cut),
         }
     }
 }
@@ -117,9 +118,9 @@ impl Config {
         u_q: Voltage,
     ) -> Current {
         match self {
-            Self::ObserverBased(c) => c.current_at(&state.observer_based, reference, fb, u_q),
+            Self::ObserverBased(c, _) => c.current_at(&state.observer_based, reference, fb, u_q),
             Self::Synchronous(c) => c.current_at(&state.synchronous, reference, fb, u_q),
-            Self::Modified(c) => c.current_at(&state.modified, reference, fb, u_q),
+            Self::Modified(c, _) => c.current_at(&state.modified, reference, fb, u_q),
         }
     }
 
@@ -129,9 +130,9 @@ impl Config {
     /// The modified regulator takes over within a quarter turn of the q axis, with either sign.
     pub fn preset(&self, state: &mut State, u: Dq<Voltage>, reference: &Reference, fb: &Feedback) {
         match self {
-            Self::ObserverBased(c) => c.preset(&mut state.observer_based, u, reference, fb),
+            Self::ObserverBased(c, _) => c.preset(&mut state.observer_based, u, reference, fb),
             Self::Synchronous(c) => c.preset(&mut state.synchronous, u, reference, fb),
-            Self::Modified(c) => c.preset(&mut state.modified, u, reference, fb),
+            Self::Modified(c, _) => c.preset(&mut state.modified, u, reference, fb),
         }
     }
 

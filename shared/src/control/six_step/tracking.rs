@@ -160,6 +160,10 @@ fn bounded(turn_bits: i64) -> Angle {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::parts;
+
+    const NONE: Delay = Delay::None(parts::Bench::HERE);
+    const HALF: Delay = Delay::Half(parts::Bench::HERE);
 
     /// Converts periods between crossings to turns per period.
     fn speed(sextant_periods: f64) -> f64 {
@@ -170,8 +174,8 @@ mod tests {
     /// commutation's lateness in degrees.
     fn lateness(turned: impl Fn(f64) -> f64, periods: u32, delay: Delay) -> std::vec::Vec<f64> {
         let lead = match delay {
-            Delay::None => 0.0,
-            Delay::Half => 0.5,
+            Delay::None(_) => 0.0,
+            Delay::Half(_) => 0.5,
             Delay::One => 1.0,
         };
         let mut state = State::at_rest(Speed::ZERO);
@@ -205,7 +209,7 @@ mod tests {
     fn at_a_constant_speed_commutation_is_within_half_a_period_of_thirty_degrees() {
         // 5.56 periods are 6000 rpm with 12 pole pairs at 40 kHz, 33.3 are 1000 rpm.
         for sextant_periods in [4.03, 5.556, 11.7, 33.333, 400.618] {
-            for delay in [Delay::None, Delay::Half, Delay::One] {
+            for delay in [NONE, HALF, Delay::One] {
                 let late = lateness(|t| t / sextant_periods - 0.3, 20_000, delay);
                 assert!(late.len() > 40);
                 let half_period_deg = 30.0 / sextant_periods;

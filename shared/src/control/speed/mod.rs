@@ -6,6 +6,7 @@ pub mod nested;
 
 use super::planner;
 use super::regulator::Reference;
+use crate::parts;
 use crate::trace::traced;
 use crate::units::{Current, Speed, stated_torque};
 pub use input::{Bounds, Input};
@@ -25,7 +26,7 @@ pub enum Law {
     /// First paper, (8) and (9).
     Nested(nested::Config),
     /// Second paper, figure 47.
-    FeedForward(feed_forward::Config),
+    FeedForward(feed_forward::Config, parts::Propeller),
 }
 
 impl Default for Law {
@@ -56,7 +57,7 @@ impl Config {
                 (step, self.planner.slew),
                 input,
             ),
-            Law::FeedForward(c) => {
+            Law::FeedForward(c, _) => {
                 state.planner.advance(step);
                 let reference = state.planner.reference;
                 c.current(&mut state.feed_forward, reference, input)
@@ -69,7 +70,7 @@ impl Config {
         state.planner = planner::State::begin(speed);
         match &self.law {
             Law::Nested(_) => state.nested.sigma = stated_torque(i_q),
-            Law::FeedForward(c) => state.feed_forward.sigma = c.remainder(speed, i_q),
+            Law::FeedForward(c, _) => state.feed_forward.sigma = c.remainder(speed, i_q),
         }
     }
 }

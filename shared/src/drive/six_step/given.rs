@@ -22,7 +22,7 @@ pub(in crate::drive) fn position(
     observer: &observer::State,
     shared: &Shared,
 ) -> Option<(Angle, Speed)> {
-    (config.observer == observer::Config::Given)
+    matches!(config.observer, observer::Config::Given(_))
         .then(|| observer.given.seen(shared.swapped(config)))
 }
 

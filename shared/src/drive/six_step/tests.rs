@@ -83,7 +83,7 @@ fn park_holds_two_phases_low_and_ramp_lets_one_float() {
 #[test]
 fn a_rotor_whose_position_is_told_is_driven_from_where_it_stands() {
     let (config, _) = drive(&[(ParamId::Inp3d, 1.0)]);
-    let config = config.with_position_given();
+    let config = config.with_position_given(crate::parts::Bench::HERE);
     for (sector, backwards) in [(Sector::Ab, false), (Sector::Bc, false), (Sector::Ca, true)] {
         let mut state = State::new(&config);
         let sign = if backwards { -1 } else { 1 };

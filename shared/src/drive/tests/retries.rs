@@ -19,7 +19,7 @@ struct Flight {
 impl Flight {
     fn new(changes: &[(ParamId, f32)]) -> Self {
         let mut bench = Bench::new(changes);
-        bench.config = bench.config.with_position_given();
+        bench.config = bench.config.with_position_given(crate::parts::Bench::HERE);
         let theta = Angle::ZERO;
         Self {
             bench,

@@ -16,6 +16,7 @@ use crate::math::{Real, settled, square_root};
 use crate::params::choice::{CtlFluxForm, CtlHall, CtlObserver};
 use crate::params::from_motor::LEAST_SHARE;
 use crate::params::{Board, ParamId, Params};
+use crate::parts;
 use crate::units::Angle;
 
 /// τ_int·ω at half of `STA_RUN_RPM`, where Run ends with the defaults: there the first-order integrator leads by 10°
@@ -121,14 +122,19 @@ impl FluxSettings {
     }
 }
 
+/// Returns the source of the edges, if this build has it.
+pub(super) fn sensors(p: &Si) -> Option<Sensors> {
+    let (crossings, hall) = (parts::FluxCrossings::get(), parts::Hall::get());
+    match (p.choice(), p.choice()) {
+        (CtlObserver::Hall, CtlHall::Alone) => hall.map(Sensors::Hall),
+        (CtlObserver::Hall, CtlHall::Merged) => Some(Sensors::Merged(hall?, crossings?)),
+        _ => crossings.map(Sensors::None),
+    }
+}
+
 /// Sets up the edge-based position estimation: sections 2.2 to 2.4.
 pub(super) fn edges(p: &Si, place: &mut Config) {
     let settings = FluxSettings::of(p);
-    place.sensors = match (p.choice(), p.choice()) {
-        (CtlObserver::Hall, CtlHall::Alone) => Sensors::Hall,
-        (CtlObserver::Hall, CtlHall::Merged) => Sensors::Merged,
-        _ => Sensors::None,
-    };
     integrators(p, &settings, &mut place.flux);
     let crossing = &mut place.crossing;
     crossing.deadband = I0F32::from_f32(DEADBAND);

@@ -35,6 +35,7 @@ use crate::control::sensing::Shunts;
 use crate::drive::{Config, Direction, Drift, Stop, Thresholds};
 use crate::input::signal::Signal;
 use crate::math::Real;
+use crate::parts;
 use crate::protection;
 use crate::units::{Current, Scale, Voltage, stated_emf};
 use core::cell::Cell;
@@ -150,9 +151,9 @@ pub fn build_in(
         );
     }
     refuse_contradictions(&p);
-    let modulation = match p.choice() {
-        CtlModulation::SpaceVector => Modulation::SpaceVector,
-        CtlModulation::Sine => Modulation::Sine,
+    let modulation = match (p.choice(), parts::Sine::get()) {
+        (CtlModulation::Sine, Some(part)) => Modulation::Sine(part),
+        _ => Modulation::SpaceVector,
     };
     let (duty_max, window) = sensing::duty_max(&p, modulation);
     if refused.get().is_some() {
@@ -381,7 +382,7 @@ mod tests {
         }
         let board = Board {
             shunts: Shunts::Two,
-            delay: Delay::Half,
+            delay: Delay::Half(parts::Bench::HERE),
             ..Board::BENCH
         };
         let mut place = build(&others, &board).expect("it makes a drive");

@@ -11,6 +11,7 @@ use crate::control::observer::{self, back_emf, compensated, edges};
 use crate::math::{EIGHTH_PI, Multiplier, settled, square_root};
 use crate::params::ParamId;
 use crate::params::choice::{CtlObsCure, CtlObserver};
+use crate::parts;
 use crate::units::{INVERSE_FLUX_NOMINAL, InverseFlux};
 
 /// Poles of the attitude observer (22) over the current bandwidth: Table III has 425.6 against 2357 1/s.
@@ -53,19 +54,25 @@ const INDUCTANCE_MAX: f32 = 4.0;
 /// Sets up the observer that `CTL_OBSERVER` selects.
 pub(super) fn observer(p: &Si, place: &mut observer::Config) {
     match p.choice() {
-        CtlObserver::BackEmf => *place = observer::Config::BackEmf(back_emf::Config::default()),
+        CtlObserver::BackEmf => {
+            if let Some(part) = parts::BackEmf::get() {
+                *place = observer::Config::BackEmf(back_emf::Config::default(), part);
+            }
+        }
         CtlObserver::FluxCrossings | CtlObserver::Hall => {
-            *place = observer::Config::Edges(edges::Config::default());
+            if let Some(edges) = flux::sensors(p).map(edges::Config::new) {
+                *place = observer::Config::Edges(edges);
+            }
         }
         CtlObserver::Compensated => {
             *place = observer::Config::Compensated(compensated::Config::default());
         }
     }
     match place {
-        observer::Config::BackEmf(place) => back_emf(p, place),
+        observer::Config::BackEmf(place, _) => back_emf(p, place),
         observer::Config::Edges(place) => flux::edges(p, place),
         observer::Config::Compensated(place) => compensated(p, place),
-        observer::Config::Given => {}
+        observer::Config::Given(_) => {}
     }
 }
 
@@ -85,8 +92,8 @@ fn compensated(p: &Si, place: &mut compensated::Config) {
     p.set(Quantity::OmegaN, square_root(formulas.value()));
     // If the voltage changes in the middle of the period, β is half, with the opposite sign.
     let share = match p.board.delay {
-        Delay::None | Delay::One => 1.0,
-        Delay::Half => -0.5,
+        Delay::None(_) | Delay::One => 1.0,
+        Delay::Half(_) => -0.5,
     };
     p.set(Quantity::Share, share);
     fill!(p, place, {

@@ -7,6 +7,7 @@ use crate::control::speed::{Config, Law, feed_forward, nested};
 use crate::control::{planner, torque};
 use crate::math::{Gain, Real};
 use crate::params::choice::{CtlObserver, CtlRegulator, CtlSpeed};
+use crate::parts;
 use crate::units::Speed;
 
 /// k_iω/k_pω over k_pω/J: Table III has 5.87 against 49.65 1/s.
@@ -69,12 +70,16 @@ pub(super) fn speed(p: &Si, place: &mut Config) {
     let law = p.choice();
     match law {
         CtlSpeed::Inertia | CtlSpeed::Pi => place.law = Law::Nested(nested::Config::default()),
-        CtlSpeed::Propeller => place.law = Law::FeedForward(feed_forward::Config::default()),
+        CtlSpeed::Propeller => {
+            if let Some(part) = parts::Propeller::get() {
+                place.law = Law::FeedForward(feed_forward::Config::default(), part);
+            }
+        }
     }
     match &mut place.law {
         Law::Nested(place) if law == CtlSpeed::Pi => published(p, place),
         Law::Nested(place) => with_inertia(p, place),
-        Law::FeedForward(place) => feed_forward(p, place),
+        Law::FeedForward(place, _) => feed_forward(p, place),
     }
 }
 

@@ -4,6 +4,7 @@ use super::formula::{define, fill};
 use super::si::Si;
 use crate::control::regulator::{Config, modified, observer_based, synchronous};
 use crate::params::choice::CtlRegulator;
+use crate::parts;
 
 /// Second pole of the current regulator over the first (21): Table III has −2357 and −2142, a ratio
 /// of 0.909.
@@ -13,15 +14,21 @@ const SECOND_POLE_SHARE: f32 = 0.909;
 pub(super) fn regulator(p: &Si, place: &mut Config) {
     match p.choice() {
         CtlRegulator::ObserverBased => {
-            *place = Config::ObserverBased(observer_based::Config::default());
+            if let Some(part) = parts::BackEmf::get() {
+                *place = Config::ObserverBased(observer_based::Config::default(), part);
+            }
         }
         CtlRegulator::Synchronous => *place = Config::Synchronous(synchronous::Config::default()),
-        CtlRegulator::Modified => *place = Config::Modified(modified::Config::default()),
+        CtlRegulator::Modified => {
+            if let Some(part) = parts::Modified::get() {
+                *place = Config::Modified(modified::Config::default(), part);
+            }
+        }
     }
     match place {
-        Config::ObserverBased(place) => observer_based(p, place),
+        Config::ObserverBased(place, _) => observer_based(p, place),
         Config::Synchronous(place) => synchronous(p, place),
-        Config::Modified(place) => modified(p, place),
+        Config::Modified(place, _) => modified(p, place),
     }
 }
 

@@ -80,7 +80,7 @@ pub(super) fn duty_max(p: &Si, modulation: Modulation) -> (f32, f32) {
         Shunts::Three => {
             let second = match modulation {
                 Modulation::SpaceVector => 0.5 + SQRT_3 / 4.0,
-                Modulation::Sine => 0.75,
+                Modulation::Sine(_) => 0.75,
             };
             (window - p.of(Quantity::DeadShare)) / second
         }

@@ -69,7 +69,7 @@ pub(super) fn six_step(p: &Si, duty_max: f32, place: &mut Config) {
         number greatest(GreatestV / UnitV),
     });
     crossing.delayed = match p.board.delay {
-        Delay::None | Delay::Half => 0,
+        Delay::None(_) | Delay::Half(_) => 0,
         Delay::One => 1,
     };
     let duty = &mut place.duty;

@@ -8,7 +8,11 @@ use crate::control::PERIODS;
 use crate::control::delay::Delay;
 use crate::control::observer;
 use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
+use crate::parts;
 use crate::units::{Scale, Voltage};
+
+const NONE: Delay = Delay::None(parts::Bench::HERE);
+const HALF: Delay = Delay::Half(parts::Bench::HERE);
 
 const R: f64 = 0.108;
 const L: f64 = 30.6e-6;
@@ -121,7 +125,7 @@ proptest! {
         i in (-15.0..15.0_f64, -15.0..15.0_f64),
         i_before in (-15.0..15.0_f64, -15.0..15.0_f64),
         u in (-8.0..8.0_f64, -8.0..8.0_f64),
-        delay in prop_oneof![Just(Delay::None), Just(Delay::Half), Just(Delay::One)],
+        delay in prop_oneof![Just(NONE), Just(HALF), Just(Delay::One)],
         imposed in prop_oneof![Just(None), (0.0..800.0_f64).prop_map(Some)],
     ) {
         let (config, scale) = config(delay, &[]);
@@ -154,7 +158,7 @@ proptest! {
         let moved_phi = phi + phi_step;
         let next_phi = moved_phi.clamp(0.3 * PHI, 2.0 * PHI);
         // 3, with the voltage's half-period delay.
-        let half = if delay == Delay::Half { -0.5 } else { 1.0 };
+        let half = if delay == HALF { -0.5 } else { 1.0 };
         let beta = half * R * TS * TS / (12.0 * L);
         let leak = plus(psi_r, times(turned((phi, 0.0), theta), -1.0));
         let held = plus(times(psi_r, beta * plus_rad_s * plus_rad_s), times(leak, -0.5 * plus_rad_s));

@@ -7,7 +7,12 @@ use std::vec::Vec;
 use super::*;
 use crate::control::observer::{self, sector::Sector};
 use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
+use crate::parts;
 use crate::units::Scale;
+
+const CROSSINGS: Sensors = Sensors::None(parts::FluxCrossings::HERE);
+const HALL: Sensors = Sensors::Hall(parts::Hall::HERE);
+const MERGED: Sensors = Sensors::Merged(parts::Hall::HERE, parts::FluxCrossings::HERE);
 
 const R: f64 = 0.108;
 const L: f64 = 30.6e-6;
@@ -47,13 +52,13 @@ impl Bench {
             params.set(*id, *value).expect("in range");
         }
         let observer = match sensors {
-            Sensors::None => 1.0,
-            Sensors::Hall | Sensors::Merged => 2.0,
+            Sensors::None(_) => 1.0,
+            Sensors::Hall(_) | Sensors::Merged(..) => 2.0,
         };
         params
             .set(ParamId::CtlObserver, observer)
             .expect("in range");
-        let hall = f32::from(u8::from(sensors != Sensors::Hall));
+        let hall = f32::from(u8::from(sensors != HALL));
         params.set(ParamId::CtlHall, hall).expect("in range");
         let config = build(&params, &Board::BENCH).expect("the defaults fit");
         let observer::Config::Edges(edges) = config.observer else {
@@ -155,7 +160,7 @@ impl Bench {
 fn at_a_steady_speed_lead_and_delays_are_compensated() {
     for form in [0.0, 1.0, 2.0, 3.0] {
         for rpm in [150.0, 300.0, 1000.0, 3000.0, 6000.0] {
-            let mut bench = Bench::new(Sensors::None, &[(ParamId::CtlFluxForm, form)]);
+            let mut bench = Bench::new(CROSSINGS, &[(ParamId::CtlFluxForm, form)]);
             bench.rpm = rpm;
             bench.begin();
             bench.run(2.0);
@@ -169,7 +174,7 @@ fn at_a_steady_speed_lead_and_delays_are_compensated() {
 #[test]
 fn current_costs_at_most_what_the_integrators_do_to_its_flux() {
     for rpm in [300.0, 1000.0, 6000.0] {
-        let mut bench = Bench::running(Sensors::None, &[], rpm);
+        let mut bench = Bench::running(CROSSINGS, &[], rpm);
         bench.i_q = 15.0;
         bench.run(2.0);
         let worst = bench.run(0.2);
@@ -184,7 +189,7 @@ fn current_costs_at_most_what_the_integrators_do_to_its_flux() {
 #[test]
 fn a_wrong_inductance_turns_the_angle_by_the_papers_amount_and_a_wrong_resistance_hardly() {
     let error = |id: ParamId, value: f64, rpm: f64| {
-        let mut bench = Bench::new(Sensors::None, &[(id, value as f32)]);
+        let mut bench = Bench::new(CROSSINGS, &[(id, value as f32)]);
         bench.rpm = rpm;
         bench.begin();
         bench.i_q = 15.0;
@@ -206,7 +211,7 @@ fn a_wrong_inductance_turns_the_angle_by_the_papers_amount_and_a_wrong_resistanc
 #[test]
 fn noise_of_the_sensors_moves_the_angle_by_a_degree_or_two() {
     for rpm in [300.0, 1000.0, 6000.0] {
-        let mut bench = Bench::running(Sensors::None, &[], rpm);
+        let mut bench = Bench::running(CROSSINGS, &[], rpm);
         bench.noise_a = 0.05;
         let worst = bench.run(0.5);
         // 0.05 A·(R·T_s·√(τ/2T_s) + L) of the flux is 0.2°; five times that at worst.
@@ -217,7 +222,7 @@ fn noise_of_the_sensors_moves_the_angle_by_a_degree_or_two() {
 #[test]
 fn accelerating_as_hard_as_the_drive_may_keeps_the_error_below_20_degrees() {
     for a_e in [0.0, 0.5, 0.9] {
-        let mut bench = Bench::running(Sensors::None, &[(ParamId::CtlAe, a_e)], 300.0);
+        let mut bench = Bench::running(CROSSINGS, &[(ParamId::CtlAe, a_e)], 300.0);
         // CTL_SLEW_RPM_S; extrapolation and filter may contribute 10° each.
         let up = bench.ramp(20_000.0, 5_700.0 / 20_000.0);
         let down = bench.ramp(-20_000.0, 5_400.0 / 20_000.0);
@@ -227,7 +232,7 @@ fn accelerating_as_hard_as_the_drive_may_keeps_the_error_below_20_degrees() {
 
 #[test]
 fn a_rotor_that_stops_is_lost_and_one_that_turns_again_is_found() {
-    let mut bench = Bench::running(Sensors::None, &[], 1000.0);
+    let mut bench = Bench::running(CROSSINGS, &[], 1000.0);
     bench.rpm = 0.0;
     // The patience is two sixths of a turn at 150 rpm.
     let seconds = 2.0 / 6.0 / 30.0 + 0.003;
@@ -246,7 +251,7 @@ fn a_rotor_that_stops_is_lost_and_one_that_turns_again_is_found() {
 
 #[test]
 fn sensors_tell_the_position_at_standstill_at_once() {
-    for sensors in [Sensors::Hall, Sensors::Merged] {
+    for sensors in [HALL, MERGED] {
         for degrees in 0..360 {
             let mut bench = Bench::new(sensors, &[]);
             bench.turns = f64::from(degrees) / 360.0;
@@ -261,7 +266,7 @@ fn sensors_tell_the_position_at_standstill_at_once() {
 
 #[test]
 fn sensors_start_a_motor_and_follow_it_to_its_stop() {
-    for sensors in [Sensors::Hall, Sensors::Merged] {
+    for sensors in [HALL, MERGED] {
         let mut bench = Bench::new(sensors, &[]);
         bench.step();
         bench.step();
@@ -282,7 +287,7 @@ fn sensors_start_a_motor_and_follow_it_to_its_stop() {
 
 #[test]
 fn flux_crossings_take_over_above_a_speed_and_sensors_below_another() {
-    let mut bench = Bench::new(Sensors::Merged, &[]);
+    let mut bench = Bench::new(MERGED, &[]);
     // Sensors 12° off: the error tells which source leads.
     bench.hall_deg = 12.0;
     bench.step();
@@ -305,7 +310,7 @@ fn flux_crossings_take_over_above_a_speed_and_sensors_below_another() {
 fn a_sensor_that_fails_is_noticed_and_survived() {
     let faults: [fn(u8) -> u8; 5] = [|code| code | 1, |code| code & !2, |_| 7, |_| 0, |_| 0b011];
     for spoil in faults {
-        let mut bench = Bench::running(Sensors::Merged, &[], 1000.0);
+        let mut bench = Bench::running(MERGED, &[], 1000.0);
         bench.spoil = spoil;
         // Ten turns.
         let worst = bench.run(0.05);
@@ -321,7 +326,7 @@ fn a_sensor_that_fails_is_noticed_and_survived() {
 
 #[test]
 fn sensors_that_contradict_the_fluxes_are_at_fault() {
-    let mut bench = Bench::running(Sensors::Merged, &[], 1000.0);
+    let mut bench = Bench::running(MERGED, &[], 1000.0);
     bench.hall_deg = 150.0;
     assert!(bench.run(0.1) < 1.0);
     assert!(bench.step().sensor_fault);
@@ -329,7 +334,7 @@ fn sensors_that_contradict_the_fluxes_are_at_fault() {
 
 #[test]
 fn sensors_that_are_right_are_never_at_fault() {
-    let mut bench = Bench::running(Sensors::Merged, &[], 200.0);
+    let mut bench = Bench::running(MERGED, &[], 200.0);
     for hall_deg in [-15.0, 0.0, 15.0] {
         bench.hall_deg = hall_deg;
         bench.ramp(5_000.0, 1.0);
@@ -340,7 +345,7 @@ fn sensors_that_are_right_are_never_at_fault() {
 
 #[test]
 fn alone_a_sensor_that_fails_leaves_the_position_unknown() {
-    let mut bench = Bench::running(Sensors::Hall, &[], 1000.0);
+    let mut bench = Bench::running(HALL, &[], 1000.0);
     bench.spoil = |code| code | 4;
     let last = (0..240).map(|_| bench.step()).last().expect("some");
     assert!(last.sensor_fault && !last.known);
@@ -348,7 +353,7 @@ fn alone_a_sensor_that_fails_leaves_the_position_unknown() {
 
 #[test]
 fn at_low_speed_too_a_failed_sensor_is_noticed_and_a_start_without_it_works() {
-    let mut bench = Bench::new(Sensors::Merged, &[]);
+    let mut bench = Bench::new(MERGED, &[]);
     bench.spoil = |_| 7;
     let last = (0..100).map(|_| bench.step()).last().expect("some");
     assert!(last.sensor_fault && !last.known);
@@ -366,7 +371,7 @@ proptest! {
         words in prop::collection::vec((any::<[i32; 6]>(), any::<u8>(), 0_u8..50), 1..200),
         merged in any::<bool>(),
     ) {
-        let sensors = if merged { Sensors::Merged } else { Sensors::None };
+        let sensors = if merged { MERGED } else { CROSSINGS };
         let mut bench = Bench::new(sensors, &[]);
         for ([a, b, c, d, e, f], hall, what) in words {
             let i = [d, e, f].map(Current::from_bits);
