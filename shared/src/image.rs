@@ -1,7 +1,25 @@
 //! The program's identity, for ground stations (AUTOPILOT_VERSION) and flight controllers (DShot command 6).
 
+use crate::parts::{self, Choice};
+
 /// Version of every program in this repository: major, minor, patch.
 pub const VERSION: [u8; 3] = version();
+
+/// The version for people: with its parts behind it where a program lacks some.
+pub const VERSION_TEXT: &str = match parts::CHOICE {
+    Choice::All => env!("CARGO_PKG_VERSION"),
+    Choice::Flight => concat!(env!("CARGO_PKG_VERSION"), " flight"),
+    Choice::Papers => concat!(env!("CARGO_PKG_VERSION"), " papers"),
+    Choice::Custom => concat!(env!("CARGO_PKG_VERSION"), " custom"),
+};
+
+/// A program's parts in a word of eight bytes, for AUTOPILOT_VERSION.
+pub const PARTS: &[u8; 8] = match parts::CHOICE {
+    Choice::All => b"all\0\0\0\0\0",
+    Choice::Flight => b"flight\0\0",
+    Choice::Papers => b"papers\0\0",
+    Choice::Custom => b"custom\0\0",
+};
 
 /// A program built for a board, and the chip it runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

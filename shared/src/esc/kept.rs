@@ -1,6 +1,7 @@
 //! The values that survive a loss of power.
 
 use super::Esc;
+use crate::mavlink::Warning;
 use crate::params::{BuildError, ParamId};
 use crate::record::Record;
 use crate::store::{Kept, Loaded};
@@ -19,6 +20,16 @@ impl Esc {
         }
         if let Some(trouble) = loaded.trouble() {
             self.warn_of(trouble);
+        }
+        if let Some(id) = self.params.lacking() {
+            // The number of a choice has one digit.
+            let number = char::from(b'0' + self.params.get(id) as u8);
+            let mut warning = Warning::new();
+            let _ = warning.push_str(id.entry().name);
+            let _ = warning.push(' ');
+            let _ = warning.push(number);
+            let _ = warning.push_str(": not in this image, flash papers");
+            self.warn(warning);
         }
         if self.params.get(ParamId::MotPolePairs) == 0.0 {
             self.warn_of("MOT_POLE_PAIRS unknown: speeds assume 7");

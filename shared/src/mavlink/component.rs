@@ -28,7 +28,6 @@ use crate::params::{ParamId, Params};
 mod send;
 
 const PING_ID: u32 = PING.0;
-const START_TEXT: &str = concat!("Siskin ESC ", env!("CARGO_PKG_VERSION"), ", ");
 
 /// One ESC on MAVLink. Frames may come from several links; its own go to all of them.
 #[derive(Clone, Debug)]

@@ -8,7 +8,7 @@ use super::group::Escs;
 use super::identity::Identity;
 use super::payload::Payload;
 use crate::drive::Faults;
-use crate::image::{Image, VERSION};
+use crate::image::{Image, PARTS, VERSION};
 use crate::input::signal::{Pulse, Signal};
 use crate::math::{quotient, round};
 use crate::params::{ParamId, Params, TABLE};
@@ -127,6 +127,8 @@ pub(super) fn autopilot_version(payload: &mut Payload, image: &Image) {
         payload.u32(word);
     }
     payload.put(&image.build);
+    // Instead of a middleware's: which parts of the drive the program has.
+    payload.put(PARTS);
 }
 
 pub(super) fn param_value(payload: &mut Payload, params: &Params, id: ParamId) {

@@ -97,6 +97,10 @@ fn take(id: ParamId, value: f32, stopped: bool, context: &mut Context) -> Result
         let reason = "the motor turns; stop it first";
         return Err(Refusal::new(NOT_PERMITTED, reason));
     }
+    if id.lacks(value) && value != context.params.get(id) {
+        let reason = "not in this image: flash the papers image";
+        return Err(Refusal::new(OUT_OF_RANGE, reason));
+    }
     change(id, value, context)
 }
 

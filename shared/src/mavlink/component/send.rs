@@ -7,7 +7,8 @@ use mavlink::dialects::ardupilotmega::{
     PARAM_VALUE_DATA,
 };
 
-use super::{Component, Context, START_TEXT};
+use super::{Component, Context};
+use crate::image::VERSION_TEXT;
 use crate::mavlink::faults::FaultEvent;
 use crate::mavlink::frame::Address;
 use crate::mavlink::group::Escs;
@@ -31,7 +32,7 @@ impl Component {
         self.files.rest();
         self.report_faults(context, send);
         if !core::mem::replace(&mut self.started, true) {
-            let text = [START_TEXT, self.image.board];
+            let text = ["Siskin ESC ", VERSION_TEXT, ", ", self.image.board];
             self.text(MavSeverity::MAV_SEVERITY_INFO, &text, send);
         }
         while let Some(reply) = self.replies.next() {
