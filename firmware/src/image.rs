@@ -6,6 +6,7 @@
 //! one; a stamped image that is damaged starts into [`damaged`](crate::damaged). The check takes 1.4 ms of a
 //! G431's start, on the virtual board.
 
+use siskin_control::image::VERSION_TEXT;
 #[cfg(board)]
 use siskin_control::image::{NO_WORDS, check_sum};
 
@@ -30,7 +31,7 @@ impl Image {
         Self {
             mark: MARK,
             board: field(board),
-            version: field(env!("CARGO_PKG_VERSION")),
+            version: field(VERSION_TEXT),
             commit: field(env!("SISKIN_COMMIT")),
         }
     }

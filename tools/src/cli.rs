@@ -7,7 +7,7 @@ use siskin_scope::HostPort;
 
 use crate::decode;
 use crate::endpoint::Endpoint;
-use crate::image::Board;
+use crate::image::{Board, Parts};
 
 /// Self-test, parameters and live telemetry of a Siskin ESC over MAVLink, images for its boards, captures of a
 /// throttle wire, and the settings and limits of a motor.
@@ -225,6 +225,10 @@ pub(crate) struct ImageArgs {
     /// Board to make it for.
     #[arg(long)]
     pub(crate) board: Option<Board>,
+    /// Parts of the drive, where the board has no room for all: 'flight' (without it), 'papers', or a list such as
+    /// 'record,hall'.
+    #[arg(long, value_name = "LIST", requires = "board", conflicts_with = "elf")]
+    pub(crate) parts: Option<Parts>,
     /// Folder for the files.
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,

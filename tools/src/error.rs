@@ -39,6 +39,14 @@ pub(crate) enum Error {
         remedy: &'static str,
     },
 
+    /// An image with these parts is larger than a memory of the chip.
+    #[error("{board}: {bytes} bytes too many for its {memory}; give --parts fewer parts")]
+    TooLarge {
+        board: &'static str,
+        memory: String,
+        bytes: u64,
+    },
+
     /// A program that does part of the work has failed.
     #[error("{program}: {reason}")]
     Program {
@@ -85,7 +93,8 @@ impl Error {
             | Self::Page(_)
             | Self::NoComponent { .. }
             | Self::File { .. }
-            | Self::Missing { .. } => ExitCode::from(2),
+            | Self::Missing { .. }
+            | Self::TooLarge { .. } => ExitCode::from(2),
             Self::Program { .. }
             | Self::Refused { .. }
             | Self::NoAnswer { .. }

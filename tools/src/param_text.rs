@@ -81,6 +81,10 @@ pub(crate) fn describe(
             facts.push_str("; taken at rest only");
         }
     }
+    let parts: Vec<_> = id.text().parts.iter().map(|part| part.name()).collect();
+    if !parts.is_empty() {
+        let _ = write!(facts, "; used by the part {}", parts.join(" or "));
+    }
     if id.text().restart {
         facts.push_str("; applies at the next start");
     }
@@ -95,9 +99,15 @@ pub(crate) fn describe(
 fn range(id: ParamId) -> String {
     let (entry, text) = (id.entry(), id.text());
     if let Some(((last, meaning), others)) = text.choices.split_last() {
-        let others = others.iter().map(|(n, meaning)| format!("{n} ({meaning})"));
-        let others: Vec<_> = others.collect();
-        return format!("{} or {last} ({meaning})", others.join(", "));
+        let choice = |number: u8, meaning: &str| match id.part(number) {
+            Some(part) => format!("{number} ({meaning}; part {})", part.name()),
+            None => format!("{number} ({meaning})"),
+        };
+        let others: Vec<_> = others
+            .iter()
+            .map(|(n, meaning)| choice(*n, meaning))
+            .collect();
+        return format!("{} or {}", others.join(", "), choice(*last, meaning));
     }
     let whole = match entry.kind {
         Kind::Whole => "a whole number from ",
@@ -120,6 +130,23 @@ mod tests {
         assert_eq!(value("MOT_STOP", 1.0), "1 (brake)");
         assert_eq!(value("MOT_POLE_PAIRS", 7.0), "7");
         assert_eq!(value("OF_ANOTHER_ESC", 0.5), "0.5");
+    }
+
+    #[test]
+    fn a_choice_and_a_parameter_name_the_part_that_they_need() {
+        let range = range(ParamId::CtlSpeed);
+        assert!(
+            range.contains("1 (PI with feed-forward of CTL_FF_A; part propeller)"),
+            "{range}"
+        );
+        let param = Param {
+            name: "CTL_FF_A".to_owned(),
+            value: 8.4,
+        };
+        let mut text = Vec::new();
+        describe(&param, Some(8.4), &mut text).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        assert!(text.contains("used by the part propeller"), "{text}");
     }
 
     #[test]

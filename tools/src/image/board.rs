@@ -55,6 +55,11 @@ impl Board {
         }
     }
 
+    /// Returns whether its images have every part of the drive; another board's flash has no room for all.
+    pub(crate) fn has_all_parts(self) -> bool {
+        self == Self::Vesc4F405
+    }
+
     /// Returns whether the chip's own bootloader can be reached by USB. The other board's USB pins drive
     /// its bridge and its CAN bus.
     pub(crate) fn has_usb(self) -> bool {

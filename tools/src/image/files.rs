@@ -15,14 +15,14 @@ const LINE_BYTES: usize = 16;
 /// Bytes that the 16 address bits of a HEX line span.
 const PAGE_BYTES: u32 = 1 << 16;
 
-/// Writes `BOARD.elf`, `.bin` and `.hex` into a folder, which is created if needed, and returns their
+/// Writes `BOARD.elf`, `.bin` and `.hex`, or `BOARD-PARTS.elf` and so on, into a folder, which is created if needed, and returns their
 /// paths.
 ///
 /// # Errors
 /// [`Error::File`] if one cannot be written.
 pub(super) fn write(image: &Image, folder: &Path) -> Result<[PathBuf; 3], Error> {
     fs::create_dir_all(folder).map_err(|e| Error::file(folder, e))?;
-    let name = |extension| folder.join(image.board.name()).with_extension(extension);
+    let name = |extension| folder.join(format!("{}.{extension}", image.name()));
     let [elf, bin, hex] = [name("elf"), name("bin"), name("hex")];
 
     fs::write(&elf, &image.file).map_err(|e| Error::file(&elf, e))?;

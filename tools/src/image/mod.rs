@@ -4,6 +4,7 @@ mod board;
 mod build;
 mod elf;
 mod files;
+mod parts;
 mod reach;
 mod seal;
 mod tag;
@@ -12,6 +13,7 @@ use std::io::Write;
 
 pub(crate) use board::Board;
 pub(crate) use elf::{Image, Piece};
+pub(crate) use parts::Parts;
 use tag::Tag;
 
 use crate::cli::ImageArgs;
@@ -25,7 +27,7 @@ use crate::error::Error;
 pub(crate) fn run(args: &ImageArgs, out: &mut dyn Write) -> Result<(), Error> {
     let elf = match (&args.elf, args.board) {
         (Some(elf), _) => elf.clone(),
-        (None, Some(board)) => build::build(board)?,
+        (None, Some(board)) => build::build(board, args.parts.as_ref())?,
         (None, None) => return Err(Error::Usage("give an ELF file or --board".to_owned())),
     };
     let image = Image::read(&elf, args.board)?;
@@ -37,6 +39,16 @@ pub(crate) fn run(args: &ImageArgs, out: &mut dyn Write) -> Result<(), Error> {
 }
 
 impl Image {
+    /// Returns the name of its files: the board, and its parts behind it unless they are those for flying or all.
+    fn name(&self) -> String {
+        let board = &self.tag.board;
+        match self.tag.version.split_once(' ') {
+            // Known words alone: a file may say anything.
+            Some((_, parts @ ("papers" | "custom"))) => format!("{board}-{parts}"),
+            _ => board.clone(),
+        }
+    }
+
     /// Returns board, version, build, size and reach, one per line.
     pub(crate) fn description(&self) -> String {
         let Tag {
