@@ -3,8 +3,6 @@
 //! By [`FromMotor`](crate::params::FromMotor)'s formulas it starts with 8 A, which drop 0.264 V; the dead time takes
 //! 4/π·200 ns·48 kHz·20 V, 0.2445 V; at the least speed the back-EMF is 1.5·0.264 V and a quarter of that, 0.4571 V.
 
-use core::cell::Cell;
-
 use super::quantity::Quantity;
 use super::si::Si;
 use super::{low_speed, observer, outer, sensing, start};
@@ -23,8 +21,8 @@ fn made<T>(changes: &[(ParamId, f32)], block: impl FnOnce(&Si) -> T) -> T {
     for (id, value) in RACING.iter().chain(changes) {
         params.set(*id, *value).expect("in range");
     }
-    let (made, quantities, refused) = (params.in_force(), Si::quantities(), Cell::new(None));
-    let p = Si::new(&made, &Board::BENCH, &quantities, &refused);
+    let (made, quantities) = (params.in_force(), Si::quantities());
+    let p = Si::new(&made, &Board::BENCH, Drift::NONE, &quantities);
     p.prepare(Drift::NONE);
     block(&p)
 }

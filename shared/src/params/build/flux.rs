@@ -1,6 +1,5 @@
 //! Coefficients of the second paper's position estimation.
 
-use core::cell::Cell;
 use core::f32::consts::TAU;
 
 use fixed::types::{I0F32, U0F32};
@@ -80,9 +79,9 @@ impl FluxSettings {
     /// The speeds above which whole turns and the filter are used follow from the paper's errors at the greatest
     /// acceleration that the drive commands.
     pub fn new(params: &Params) -> Self {
-        let (quantities, refused) = (Si::quantities(), Cell::new(None));
+        let quantities = Si::quantities();
         // They are the same on any board.
-        let p = Si::new(params, &Board::BENCH, &quantities, &refused);
+        let p = Si::new(params, &Board::BENCH, Drift::NONE, &quantities);
         p.prepare(Drift::NONE);
         Self::of(&p)
     }

@@ -260,11 +260,16 @@ const fn put(bytes: &mut [u8], at: usize, byte: u8) -> usize {
 impl Si<'_> {
     /// Starts the evaluation of these formulas.
     #[inline(never)] // the chip stores two words at each of many
-    pub(super) fn begin(&self, formulas: &'static [u8]) -> &Self {
+    pub(super) fn begin(&self, formulas: &'static [u8]) -> Formulas<'_> {
         self.formulas.set(formulas);
-        self
+        Formulas(self)
     }
+}
 
+/// The formulas that were begun.
+pub(super) struct Formulas<'a>(&'a Si<'a>);
+
+impl Formulas<'_> {
     /// Returns the next value as a gain; if it has none, its parameter is refused.
     pub(super) fn gain<A: Number, B: Number>(&self) -> Gain<A, B> {
         let (mantissa, shift) = self.parts(B::Frac::I32 - A::Frac::I32 + LEAST);
@@ -325,7 +330,7 @@ impl Si<'_> {
     /// Refuses the parameter in `head` if `refused`.
     fn refuse_head(&self, refused: bool, head: u8, reason: &'static str) {
         if let Some(param) = ParamId::ALL.get(usize::from(head)) {
-            self.refuse_if(refused, *param, reason);
+            self.0.refuse_if(refused, *param, reason);
         }
     }
 
@@ -379,16 +384,16 @@ impl Si<'_> {
 
     /// Returns the quantity of an operand or a head, or `None` where a number follows.
     fn quantity(&self, byte: u8) -> Option<&Cell<f32>> {
-        self.quantities.get(usize::from(byte & !OVER))
+        self.0.quantities.get(usize::from(byte & !OVER))
     }
 
     /// Returns the next byte; after the last one, [`END`].
     #[inline(never)] // as above
     fn byte(&self) -> u8 {
-        let Some((byte, rest)) = self.formulas.get().split_first() else {
+        let Some((byte, rest)) = self.0.formulas.get().split_first() else {
             return END;
         };
-        self.formulas.set(rest);
+        self.0.formulas.set(rest);
         *byte
     }
 }
@@ -415,12 +420,11 @@ mod tests {
     /// Returns the parameter that a test's formulas refuse on a motor of 18 mΩ.
     fn made(test: impl FnOnce(&Si)) -> Option<ParamId> {
         let (params, quantities) = (Params::of(&BOSSO_BENCH), Si::quantities());
-        let refused = Cell::new(None);
-        let p = Si::new(&params, &Board::BENCH, &quantities, &refused);
+        let p = Si::new(&params, &Board::BENCH, Drift::NONE, &quantities);
         p.prepare(Drift::NONE);
         p.set(Quantity::R, 0.018);
         test(&p);
-        refused.get().map(|refused| refused.param)
+        p.refused.get().map(|refused| refused.param)
     }
 
     #[test]

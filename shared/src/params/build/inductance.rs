@@ -1,8 +1,8 @@
 //! Coefficients of the inductance adaptation.
 
-use super::formula::fill;
 use super::si::Si;
 use crate::control::inductance::{Config, MEAN_PERIODS_MAX};
+use crate::params::ParamId;
 use crate::params::choice::CtlAdaptL;
 use crate::parts;
 
@@ -22,10 +22,8 @@ pub(super) fn inductance(p: &Si, place: &mut Option<Config>) {
         return;
     };
     let place = place.insert(Config::new(part));
-    fill!(p, place, {
-        number amplitude([AMPLITUDE_SHARE] * LimitA / UnitA),
-        count half_periods([HALF_S] / T),
-        gain gain(MotLUh, [STEP] * UnitWb / UnitA / L),
-    });
+    place.amplitude = p.scale.current_from_a(AMPLITUDE_SHARE * p.limit_a);
+    place.half_periods = p.periods(HALF_S);
+    place.gain = p.gain(ParamId::MotLUh, STEP * p.unit_wb / p.unit_a / p.l);
     place.mean_periods = (place.half_periods / 4).min(MEAN_PERIODS_MAX);
 }

@@ -38,7 +38,6 @@ use crate::math::Real;
 use crate::parts;
 use crate::protection;
 use crate::units::{Current, Scale, Voltage, stated_emf};
-use core::cell::Cell;
 
 /// Fastest rotor that six edges per turn can follow, turns per period: two periods per edge.
 const EDGES_TURNS: f32 = 1.0 / 12.0;
@@ -138,10 +137,9 @@ pub fn build_in(
     drift: Drift,
     place: &mut Config,
 ) -> Result<(), BuildError> {
-    let refused = Cell::new(None);
     let made = params.in_force();
     let quantities = Si::quantities();
-    let p = Si::new(&made, board, &quantities, &refused);
+    let p = Si::new(&made, board, drift, &quantities);
     p.prepare(drift);
     if let Some(unknown) = params.unknown() {
         p.refuse_if(
@@ -156,7 +154,7 @@ pub fn build_in(
         _ => Modulation::SpaceVector,
     };
     let (duty_max, window) = sensing::duty_max(&p, modulation);
-    if refused.get().is_some() {
+    if p.refused.get().is_some() {
         // Not by `?`: the chip would copy the refusal field by field.
         return p.verdict();
     }
@@ -180,7 +178,7 @@ pub fn build_in(
     start::attempts(&p, &mut place.start);
     if !p.chosen(CtlDrive::FieldOriented) {
         // Six-step never uses the coefficients above, so they need not fit: its motor may be any.
-        refused.set(None);
+        p.refused.set(None);
     }
     place.test_current = test_current(params, &p.scale);
     place.both_ways = p.chosen(Inp3d::On);

@@ -140,11 +140,6 @@ quantities! {
         StatorFlux, CornerS, Turns, Ae, SlowRadS, TauInt, Edges, Acceleration, Known, Lag,
         WholeTurnsHz, FilterHz, WholeTurnsRpm, FilterRpm,
     }
-    // Of the start.
-    own {
-        AttemptA, AttemptJ, Haste, TorqueNm, PossibleRadS2, RampRadS2, SwingRadS, SwingTurns, SwingAs,
-        ParkCharge, HalfCharge, AgainstRadS, ReactanceOhm, EmfV,
-    }
     // Of the other observers.
     own { Decay, ActsS, Chi, ChiSquare, OmegaN, Following }
     // Of the regulators.
@@ -154,10 +149,6 @@ quantities! {
         SlewAS, GrowthAS, Slower, SlowerS, Slew, PlannerT, Inertia, Trusted, NmPerA, APerNm, Fastest, FastestSquare,
         CurrentPerSpeed,
     }
-    // Of the sensing.
-    own { LookS, CountS, CountsPerTurn, PerLook, Standing, RiseAS, CertainA }
     // Of the six-step drive.
     own { CornerRadS, LeastV, GreatestV }
-    // Of the tones.
-    own { LedA }
 }

@@ -1,9 +1,7 @@
 //! Coefficients of the sensing, the dead time and the bridge's charging.
 
-use core::f32::consts::SQRT_2;
+use core::f32::consts::{SQRT_2, TAU};
 
-use super::formula::{define, fill, value};
-use super::quantity::Quantity;
 use super::si::Si;
 use crate::control::modulator::Modulation;
 use crate::control::sensing::{self, Shunts};
@@ -67,8 +65,7 @@ const UNBALANCE_SHARE: f32 = 0.5 * OFFSET_SHARE;
 /// Returns the greatest duty at which every phase that must be read can be, and the high sides' drivers stay supplied;
 /// and the greatest duty of a phase that is read.
 pub(super) fn duty_max(p: &Si, modulation: Modulation) -> (f32, f32) {
-    let (period_s, dead_time_s) = (p.scale.period_s, p.of(Quantity::DeadTime));
-    let with_low_side_on = |s: f32| 1.0 - (s + 2.0 * dead_time_s) / period_s;
+    let with_low_side_on = |s: f32| 1.0 - (s + 2.0 * p.dead_time_s) / p.t;
     let window = with_low_side_on(p.board.low_side_on_s);
     let supplied = with_low_side_on(p.board.refresh_s);
     let read = match p.board.shunts {
@@ -82,7 +79,7 @@ pub(super) fn duty_max(p: &Si, modulation: Modulation) -> (f32, f32) {
                 Modulation::SpaceVector => 0.5 + SQRT_3 / 4.0,
                 Modulation::Sine(_) => 0.75,
             };
-            (window - p.of(Quantity::DeadShare)) / second
+            (window - p.dead_share) / second
         }
     };
     let duty_max = read.min(supplied);
@@ -103,7 +100,9 @@ pub(super) fn sensing(p: &Si, window: f32, place: &mut sensing::Config) {
     place.window = Duty::from_f32(window);
     // 5 at 8 kHz to 8 at 60 kHz.
     place.zero_readings_log2 = readings.checked_ilog2().unwrap_or(0);
-    fill!(p, place, { number offset_max([OFFSET_SHARE] * RangeA / APerCount) });
+    let board = p.board;
+    place.offset_max =
+        AdcCounts::from_f32(OFFSET_SHARE * board.current_range_a / board.current_a_per_count);
 }
 
 /// Returns the greatest mean error of the current sum.
@@ -115,47 +114,42 @@ pub(crate) fn unbalance_max(board: &Board) -> AdcCounts {
 pub(super) fn catch(p: &Si, place: &mut catch::Config) {
     let standing = p
         .scale
-        .speed_from_rpm(STANDING_SHARE * p.of(Quantity::RunRpm));
-    p.set(Quantity::Standing, standing.to_f32());
-    fill!(p, place, {
-        define LookS([catch::LOOK_PERIODS as f32] * T),
-        define PerLook(T / LookS),
-        define CountS(T * TerminalVPerCount),
-        define CountsPerTurn(Flux * Tau / CountS),
-        count emf([256.0] * CountsPerTurn),
-        number diode([DIODE_V] / TerminalVPerCount),
-        count prior([TERMINAL_NOISE_COUNTS] * CountsPerTurn * PerLook / Tau),
-        number forget_min(LookS / [MEMORY_S]),
-        number standing(
-            [HIGHEST_SHARE] * CountsPerTurn * Standing max [TERMINAL_FLOOR_COUNTS]
-        ),
-        number level_share(LookS / [LEVEL_S]),
-        count sure_looks([SURE_S] / LookS),
-        count lost_looks([UNFIT_S] / LookS),
-    });
+        .speed_from_rpm(STANDING_SHARE * p.settings.run_rpm)
+        .to_f32();
+    let v_per_count = p.board.terminal_v_per_count;
+    let look_s = catch::LOOK_PERIODS as f32 * p.t;
+    let counts_per_turn = p.flux * TAU / (p.t * v_per_count);
+    let per_look = p.t / look_s;
+    place.emf = (256.0 * counts_per_turn) as u32;
+    place.diode = Real::from_f32(DIODE_V / v_per_count);
+    place.prior = (TERMINAL_NOISE_COUNTS * counts_per_turn * per_look / TAU) as u32;
+    place.forget_min = Real::from_f32(look_s / MEMORY_S);
+    place.standing =
+        Real::from_f32((HIGHEST_SHARE * counts_per_turn * standing).max(TERMINAL_FLOOR_COUNTS));
+    place.level_share = Real::from_f32(look_s / LEVEL_S);
+    place.sure_looks = (SURE_S / look_s) as u32;
+    place.lost_looks = (UNFIT_S / look_s) as u32;
 }
 
 /// Sets up the dead-time compensation.
 pub(super) fn dead_time(p: &Si, place: &mut dead_time::Config) {
-    fill!(p, place, {
-        // At least one count of the converter: there may be no dead time.
-        define CertainA([SIGN_CERTAIN_SHARE] * SupplyMaxV * DeadTime / L max APerCount),
-        gain certainty(PwmDeadtimeNs, UnitA / CertainA),
-        number duty(DeadShare),
-        number share(DeadTime / T),
-    });
+    // At least one count of the converter: there may be no dead time.
+    let certain_a = (SIGN_CERTAIN_SHARE * p.supply_max_v * p.dead_time_s / p.l)
+        .max(p.board.current_a_per_count);
+    place.certainty = p.gain(ParamId::PwmDeadtimeNs, p.unit_a / certain_a);
+    place.duty = Real::from_f32(p.dead_share);
+    place.share = Real::from_f32(p.dead_time_s / p.t);
 }
 
 /// Returns the low sides' pulses before a switch-on: as wide as the back-EMF of the fastest rotor allows, but wide
 /// enough to be read and at most half a period, and as many as the board's charging time takes.
 pub(super) fn charge(p: &Si) -> Charge {
-    let period_s = p.scale.period_s;
-    define!(p, { RiseAS(FastestRadS * Flux / L) });
-    let allowed_s = value!(p, [CHARGE_CURRENT_SHARE] * LimitA / RiseAS);
-    let pulse_s = allowed_s.max(p.board.low_side_on_s).min(0.5 * period_s);
+    let rise_a_s = p.fastest_rad_s * p.flux / p.l;
+    let allowed_s = CHARGE_CURRENT_SHARE * p.limit_a / rise_a_s;
+    let pulse_s = allowed_s.max(p.board.low_side_on_s).min(0.5 * p.t);
     let periods = (p.board.charge_s / pulse_s) as u32 + 1;
     Charge {
-        duty: Duty::from_f32(pulse_s / period_s),
+        duty: Duty::from_f32(pulse_s / p.t),
         periods,
         spared_periods: periods.saturating_sub(p.periods(UNSEEN_S)),
     }

@@ -2,13 +2,12 @@
 
 use core::f32::consts::TAU;
 
-use super::formula::{define, fill, formulas, value};
-use super::quantity::Quantity;
 use super::si::Si;
 use crate::control::start;
 use crate::drive::ATTEMPTS;
-use crate::math::square_root;
-use crate::units::{INVERSE_FLUX_NOMINAL, Voltage};
+use crate::math::{Real, square_root};
+use crate::params::ParamId;
+use crate::units::{Charge, INVERSE_FLUX_NOMINAL, Voltage};
 
 /// Damping ζ of the rotor's swing about the current vector in Park and Ramp.
 const SWING_DAMPING: f32 = 0.5;
@@ -45,56 +44,48 @@ const SUPPLY: f32 = 2.0;
 /// Fills in the attempts of a start (section 3.2 of the second paper): each has more current, up to `LIM_PHASE_A`, and
 /// is slower than the one before.
 pub(super) fn attempts(p: &Si, places: &mut [start::Config; 1 + ATTEMPTS]) {
-    for (place, [current, inertia, haste]) in places.iter_mut().zip(&COURSES) {
-        p.set(Quantity::AttemptA, current * p.of(Quantity::RampA));
-        p.set(Quantity::AttemptJ, inertia * p.of(Quantity::J));
-        p.set(Quantity::Haste, *haste);
-        attempt(p, place);
+    for (place, course) in places.iter_mut().zip(&COURSES) {
+        attempt(p, course, place);
     }
 }
 
 /// Returns the supply that an open-loop start may use: [`SUPPLY`] times the voltage (R + ω_cl·L)·`LIM_PHASE_A` plus the
 /// back-EMF at ω_cl. In two phases of a rotor that stands, R·`LIM_PHASE_A` alone makes √3/2 of the limit.
 pub(super) fn bus(p: &Si) -> Voltage {
-    let formulas = formulas!(p, {
-        // Formulas only subtract.
-        define AgainstRadS([-TAU / 60.0] * RunRpm * PolePairs),
-        define ReactanceOhm(AgainstRadS * L),
-        define EmfV(AgainstRadS * Flux),
-        number bus(R - ReactanceOhm * LimitA - EmfV * [SUPPLY] / UnitV),
-    });
-    formulas.number()
+    let rad_s = TAU / 60.0 * p.settings.run_rpm * p.pole_pairs;
+    let volts = (p.r + rad_s * p.l) * p.limit_a + rad_s * p.flux;
+    p.voltage(volts * SUPPLY)
 }
 
-fn attempt(p: &Si, place: &mut start::Config) {
-    define!(p, {
-        AttemptA(AttemptA min LimitA),
-        // Greatest acceleration from the current, in electrical rad/s²: p·1.5·p·φ·I/J.
-        TorqueNm([1.5] * PolePairs * Flux * AttemptA),
-        PossibleRadS2([TORQUE_SHARE] * PolePairs * TorqueNm / AttemptJ),
-        RampRadS2(Haste * RampRpmS * PolePairs * Tau / [60.0] min PossibleRadS2),
-    });
+fn attempt(p: &Si, [current, inertia, haste]: &[f32; 3], place: &mut start::Config) {
+    let settings = &p.settings;
+    let current_a = (current * settings.ramp_a).min(p.limit_a);
+    let inertia = inertia * p.j;
+    let torque_nm = 1.5 * p.pole_pairs * p.flux * current_a;
+    // Greatest acceleration from the current, in electrical rad/s²: p·1.5·p·φ·I/J.
+    let possible_rad_s2 = TORQUE_SHARE * p.pole_pairs * torque_nm / inertia;
+    let stated_rad_s2 = haste * settings.ramp_rpm_s * p.pole_pairs * TAU / 60.0;
+    let ramp_rad_s2 = stated_rad_s2.min(possible_rad_s2);
     // About the current vector the rotor is a pendulum of ω_n² = 1.5·p²·φ·I/J; yielding by 2ζ/ω_n per unit of speed
     // damps it by ζ.
-    let swing_rad_s = square_root(value!(p, PolePairs * TorqueNm / AttemptJ));
-    p.set(Quantity::SwingRadS, swing_rad_s);
-    fill!(p, place, {
-        number current(AttemptA / UnitA),
-        gain yielding(MotJGcm2, [2.0 * SWING_DAMPING] / SwingRadS / T),
-        gain yield_rate(MotJGcm2, [YIELD_RATE_SHARE] * SwingRadS * T min [YIELD_RATE_MAX]),
-        define SwingAs([PARK_SWINGS * TAU] / SwingRadS * AttemptA),
-        define ParkCharge(ParkAs / Haste max SwingAs / UnitAs),
-        charge park_charge(ParkCharge),
-        define HalfCharge([0.5] * ParkCharge),
-        // A third of a turn, from one phase's axis to the next, in the first half.
-        gain sweep(StaParkAs, [1.0 / 3.0] / HalfCharge),
-        gain k_s(StaRampRpmS, RampRadS2 / Tau * T * T * UnitA / AttemptA),
-        define SwingTurns(SwingRadS * T),
-        count astray_periods([ASTRAY_SWINGS * TAU] / SwingTurns),
-        gain resistance(MotRMohm, R * VoltagePerCurrent),
-        gain reactance(MotLUh, L * VoltagePerCurrent * Tau / T),
-        number run_speed(RunRpm * TurnsPerRpm),
-    });
+    let swing_rad_s = square_root(p.pole_pairs * torque_nm / inertia);
+    let yield_rate = (YIELD_RATE_SHARE * swing_rad_s * p.t).min(YIELD_RATE_MAX);
+    let swing_as = PARK_SWINGS * TAU / swing_rad_s * current_a;
+    let park_charge = (settings.park_as / haste).max(swing_as) / p.unit_as;
+    place.current = p.scale.current_from_a(current_a);
+    place.yielding = p.gain(ParamId::MotJGcm2, 2.0 * SWING_DAMPING / swing_rad_s / p.t);
+    place.yield_rate = p.gain(ParamId::MotJGcm2, yield_rate);
+    place.park_charge = Charge::from_f32(park_charge);
+    // A third of a turn, from one phase's axis to the next, in the first half.
+    place.sweep = p.gain(ParamId::StaParkAs, 1.0 / 3.0 / (0.5 * park_charge));
+    place.k_s = p.gain(
+        ParamId::StaRampRpmS,
+        ramp_rad_s2 / TAU * p.t * p.t * p.unit_a / current_a,
+    );
+    place.astray_periods = (ASTRAY_SWINGS * TAU / (swing_rad_s * p.t)) as u32;
+    place.resistance = p.gain(ParamId::MotRMohm, p.r * p.voltage_per_current);
+    place.reactance = p.gain(ParamId::MotLUh, p.l * p.voltage_per_current * TAU / p.t);
+    place.run_speed = p.scale.speed_from_rpm(settings.run_rpm);
     place.xi_nominal = INVERSE_FLUX_NOMINAL;
 }
 

@@ -1,9 +1,11 @@
 //! Coefficients of the tones.
 
-use super::formula::fill;
-use super::quantity::Quantity;
+use core::f32::consts::TAU;
+
 use super::si::Si;
 use crate::drive::config::tone::Config;
+use crate::math::Real;
+use crate::params::ParamId;
 
 /// Share of `MOT_TONE_A` that the peaks are driven to. The dead time's part of a half cycle depends on where the
 /// samples fall, so peaks vary by up to a quarter from one to the next.
@@ -20,17 +22,15 @@ const DEAD_TIME_VECTOR: f32 = 4.0 / 3.0;
 /// Sets up the tones of `MOT_TONE_A`; none if it is 0.
 pub(super) fn tone(p: &Si, place: &mut Option<Config>) {
     *place = None;
-    if p.of(Quantity::ToneA) == 0.0 {
+    let tone_a = p.get(ParamId::MotToneA);
+    if tone_a == 0.0 {
         return;
     }
     let place = place.insert(Config::default());
-    fill!(p, place, {
-        define BoundA([LIMIT_SHARE] * LimitA min ToneA),
-        define LedA([LED_SHARE] * BoundA),
-        number peak(LedA / UnitA),
-        gain share(MotToneA, UnitA / LedA),
-        number resistive(R * LedA / UnitV),
-        gain reactive(MotLUh, Tau * L / T * LedA / UnitV),
-        number dead([DEAD_TIME_VECTOR] * DeadTime / T),
-    });
+    let led_a = LED_SHARE * (LIMIT_SHARE * p.limit_a).min(tone_a);
+    place.peak = p.scale.current_from_a(led_a);
+    place.share = p.gain(ParamId::MotToneA, p.unit_a / led_a);
+    place.resistive = p.voltage(p.r * led_a);
+    place.reactive = p.gain(ParamId::MotLUh, TAU * p.l / p.t * led_a / p.unit_v);
+    place.dead = Real::from_f32(DEAD_TIME_VECTOR * p.dead_time_s / p.t);
 }
