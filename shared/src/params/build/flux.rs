@@ -4,8 +4,6 @@ use core::f32::consts::TAU;
 
 use fixed::types::{I0F32, U0F32};
 
-use super::formula::{fill, formulas};
-use super::quantity::Quantity;
 use super::si::{SLOW_SHARE, Si};
 use crate::control::observer::edges::{Config, Sensors};
 use crate::control::observer::flux_linkage::HighPass;
@@ -16,7 +14,7 @@ use crate::params::choice::{CtlFluxForm, CtlHall, CtlObserver};
 use crate::params::from_motor::LEAST_SHARE;
 use crate::params::{Board, ParamId, Params};
 use crate::parts;
-use crate::units::Angle;
+use crate::units::{Angle, Flux, Speed};
 
 /// τ_int·ω at half of `STA_RUN_RPM`, where Run ends with the defaults: there the first-order integrator leads by 10°
 /// (2.2.2).
@@ -79,31 +77,20 @@ impl FluxSettings {
     /// The speeds above which whole turns and the filter are used follow from the paper's errors at the greatest
     /// acceleration that the drive commands.
     pub fn new(params: &Params) -> Self {
-        let quantities = Si::quantities();
         // They are the same on any board.
-        let p = Si::new(params, &Board::BENCH, Drift::NONE, &quantities);
-        p.prepare(Drift::NONE);
-        Self::of(&p)
+        let quantities = Si::quantities();
+        Self::of(&Si::new(params, &Board::BENCH, Drift::NONE, &quantities))
     }
 
     fn of(p: &Si) -> Self {
-        p.set(Quantity::Turns, p.get(ParamId::CtlPosN));
-        p.set(Quantity::Ae, p.get(ParamId::CtlAe));
-        let formulas = formulas!(p, {
-            define SlowRadS([LEAST_SHARE] * FastestRpm max RunRpm * [SLOW_SHARE] * PolePairs * Tau / [60.0]),
-            define TauInt([TAU_INT] / SlowRadS),
-            define Acceleration(SlewRpmS * PolePairs / [60.0]),
-            // In turns and seconds, K = 2·(3N + 0.5)·α·A/ω², since every edge measures anew, and θ_ef =
-            // (α·A/ω²)·(A_e/(1 − A_e))·6N·A.
-            define Edges([6.0] * Turns + [1.0]),
-            value whole_turns_above(Edges * Acceleration * [A_TURNS] / [K_MAX]),
-            define Known([1.0] - Ae),
-            define Lag(Ae / Known * [6.0] * Turns * [A_TURNS]),
-            value filter_above(Acceleration * [A_TURNS] * Lag / [ERROR_TURNS]),
-        });
-        let whole_turns_above_hz = square_root(formulas.value());
-        let filter_above_hz = square_root(formulas.value());
-        let tau_int_s = p.of(Quantity::TauInt);
+        let (turns, a_e) = (p.get(ParamId::CtlPosN), p.get(ParamId::CtlAe));
+        let slow_rpm = (LEAST_SHARE * p.fastest_rpm).max(p.settings.run_rpm) * SLOW_SHARE;
+        let tau_int_s = TAU_INT / (slow_rpm * p.pole_pairs * TAU / 60.0);
+        // In turns and seconds, K = 2·(3N + 0.5)·α·A/ω², since every edge measures anew, and θ_ef =
+        // (α·A/ω²)·(A_e/(1 − A_e))·6N·A.
+        let acceleration = p.settings.slew_rpm_s * p.pole_pairs / 60.0;
+        let edges = 6.0 * turns + 1.0;
+        let lag = a_e / (1.0 - a_e) * 6.0 * turns * A_TURNS;
         Self {
             tau_int_s,
             tau_hpfs_s: match p.choice() {
@@ -113,10 +100,10 @@ impl FluxSettings {
                 }
             },
             hold_off_turns: HOLD_OFF * A_TURNS,
-            turns: p.of(Quantity::Turns),
-            whole_turns_above_hz,
-            a_e: p.of(Quantity::Ae),
-            filter_above_hz,
+            turns,
+            whole_turns_above_hz: square_root(edges * acceleration * A_TURNS / K_MAX),
+            a_e,
+            filter_above_hz: square_root(acceleration * A_TURNS * lag / ERROR_TURNS),
         }
     }
 }
@@ -139,36 +126,28 @@ pub(super) fn edges(p: &Si, place: &mut Config) {
     crossing.deadband = I0F32::from_f32(DEADBAND);
     crossing.deadband_angle = Angle::from_f32(libm::asinf(DEADBAND) / TAU);
     crossing.hold_off = U0F32::from_f32(settings.hold_off_turns);
-    fill!(p, crossing, {
-        define SlowRadS(SlowRpm * PolePairs * Tau / [60.0] * T),
-        count patience([PATIENCE * A_TURNS * TAU] / SlowRadS),
-    });
+    // In radians per period.
+    let slowest = p.slow_rpm * p.pole_pairs * TAU / 60.0 * p.t;
+    crossing.patience = (PATIENCE * A_TURNS * TAU / slowest) as u32;
     estimator(p, &settings, &mut place.position);
     place.hall.patience = p.periods(HALL_PATIENCE_S);
-    fill!(p, place, {
-        number flux_above(RunRpm * TurnsPerRpm),
-        number hall_below(SlowRpm * TurnsPerRpm),
-    });
+    place.flux_above = p.scale.speed_from_rpm(p.settings.run_rpm);
+    place.hall_below = p.scale.speed_from_rpm(p.slow_rpm);
 }
 
 /// Sets up the flux integrators: sections 2.2 and 2.3.
 fn integrators(p: &Si, settings: &FluxSettings, place: &mut flux_linkage::Config) {
-    define_filter(p, settings.tau_int_s);
-    fill!(p, place, {
-        gain resistance(MotRMohm, R * UnitA / UnitV),
-        gain inductance(MotLUh, L * UnitA / UnitWb),
-        gain forget(StaRunRpm, Share),
-        number corner(T / CornerS),
-        define StatorFlux(L * UnitA / UnitWb),
-        number stator_max(LimitA / UnitA * StatorFlux),
-    });
+    let stator_flux = p.l * p.unit_a / p.unit_wb;
+    let tau_s = settings.tau_int_s;
+    place.resistance = p.gain(ParamId::MotRMohm, p.r * p.unit_a / p.unit_v);
+    place.inductance = p.gain(ParamId::MotLUh, stator_flux);
+    place.forget = p.gain(ParamId::StaRunRpm, settled(p.t / tau_s));
+    place.corner = corner(p, tau_s);
+    place.stator_max = Flux::from_f32(p.limit_a / p.unit_a * stator_flux);
     if let Some(tau_s) = settings.tau_hpfs_s {
-        define_filter(p, tau_s);
         let high_pass = place.high_pass.insert(HighPass::default());
-        fill!(p, high_pass, {
-            gain share(StaRunRpm, Share),
-            number corner(T / CornerS),
-        });
+        high_pass.share = p.gain(ParamId::StaRunRpm, settled(p.t / tau_s));
+        high_pass.corner = corner(p, tau_s);
     }
     place.adaptive = matches!(
         p.choice(),
@@ -176,23 +155,17 @@ fn integrators(p: &Si, settings: &FluxSettings, place: &mut flux_linkage::Config
     );
 }
 
-/// Defines a filter by its time constant: its share of a step per period, and 2π times that constant.
-fn define_filter(p: &Si, tau_s: f32) {
-    p.set(Quantity::Share, settled(p.scale.period_s / tau_s));
-    p.set(Quantity::CornerS, TAU * tau_s);
+/// Returns the corner of a filter with this time constant.
+fn corner(p: &Si, tau_s: f32) -> Speed {
+    Speed::from_f32(p.t / (TAU * tau_s))
 }
 
 /// Sets up the position estimator: section 2.4.
 fn estimator(p: &Si, settings: &FluxSettings, place: &mut position::Config) {
     place.turns = p.params.number(ParamId::CtlPosN);
-    p.set(Quantity::WholeTurnsHz, settings.whole_turns_above_hz);
-    p.set(Quantity::FilterHz, settings.filter_above_hz);
-    fill!(p, place, {
-        define WholeTurnsRpm(WholeTurnsHz * [60.0] / PolePairs),
-        number whole_turns_above(WholeTurnsRpm * TurnsPerRpm),
-        gain a_e(CtlAe, Ae),
-        define FilterRpm(FilterHz * [60.0] / PolePairs),
-        number filter_above(FilterRpm * TurnsPerRpm),
-    });
+    let speed = |hz: f32| p.scale.speed_from_rpm(hz * 60.0 / p.pole_pairs);
+    place.whole_turns_above = speed(settings.whole_turns_above_hz);
+    place.a_e = p.gain(ParamId::CtlAe, settings.a_e);
+    place.filter_above = speed(settings.filter_above_hz);
     place.compensates = true;
 }

@@ -1,18 +1,18 @@
 //! Coefficients of the observers.
 
+use core::f32::consts::TAU;
+
 use super::TORQUE_DROP_SHARE;
 use super::flux;
-use super::formula::{fill, formulas, value};
-use super::quantity::Quantity;
-use super::si::Si;
+use super::si::{LINEARISED_SHARE, Si};
 use crate::control::delay::Delay;
 use crate::control::observer::back_emf::Cure;
 use crate::control::observer::{self, back_emf, compensated, edges};
-use crate::math::{EIGHTH_PI, Multiplier, settled, square_root};
+use crate::math::{EIGHTH_PI, Multiplier, Real, settled, square_root};
 use crate::params::ParamId;
 use crate::params::choice::{CtlObsCure, CtlObserver};
 use crate::parts;
-use crate::units::{INVERSE_FLUX_NOMINAL, InverseFlux};
+use crate::units::{INVERSE_FLUX_NOMINAL, InverseFlux, Speed};
 
 /// Poles of the attitude observer (22) over the current bandwidth: Table III has 425.6 against 2357 1/s.
 const ATTITUDE_SHARE: f32 = 0.1806;
@@ -78,37 +78,39 @@ pub(super) fn observer(p: &Si, place: &mut observer::Config) {
 
 /// Sets up the compensated flux observer.
 fn compensated(p: &Si, place: &mut compensated::Config) {
-    let formulas = formulas!(p, {
-        value own_flux(L * FluxPerCurrent),
-        // ω_n squared over the current.
-        define Following([1.5 * FOLLOWING * FOLLOWING] * PolePairs * PolePairs * Flux / J),
-        value following(Following * LimitA),
-    });
+    let flux_per_current = p.unit_a / p.unit_wb;
+    let inductance = p.l * flux_per_current;
     p.refuse_if(
-        formulas.value() >= INDUCTANCE_MAX,
+        inductance >= INDUCTANCE_MAX,
         ParamId::MotLUh,
         "too high for this flux and the board's range",
     );
-    p.set(Quantity::OmegaN, square_root(formulas.value()));
     // If the voltage changes in the middle of the period, β is half, with the opposite sign.
-    let share = match p.board.delay {
+    let beta_share = match p.board.delay {
         Delay::None(_) | Delay::One => 1.0,
         Delay::Half(_) => -0.5,
     };
-    p.set(Quantity::Share, share);
-    fill!(p, place, {
-        factor half_resistance(MotRMohm, [0.5] * R * T * FluxPerCurrent),
-        factor inductance(MotLUh, L * FluxPerCurrent),
-        // β = R·T_s²/(12·L); the speed squared is in turns per period.
-        gain bias(MotLUh, R * T / L * Tau * Tau / [12.0] * Share),
-        number omega_min([OMEGA_MIN_RAD_S] * T / Tau),
-        define OmegaN(Following * Flux / R * [CAUGHT_UP] min OmegaN * T min [OMEGA_N_SHARE_MAX] / Tau),
-        number omega_n_min([OMEGA_N_RAD_S[0]] * T / Tau),
-        gain omega_n_per_current(MotJGcm2, OmegaN * [1.0 / FOLLOWING_SHARE] / LimitA * UnitA),
-        number omega_n_following(OmegaN),
-        number omega_n_max([OMEGA_N_RAD_S[1]] * T / Tau max OmegaN),
-        factor smoothing(PwmFreqHz, [SMOOTHING_RAD_S] * T),
-    });
+    // β = R·T_s²/(12·L); the speed squared is in turns per period.
+    let beta = p.r * p.t / p.l * TAU * TAU / 12.0 * beta_share;
+    // ω_n squared over the current.
+    let following = 1.5 * FOLLOWING * FOLLOWING * p.pole_pairs * p.pole_pairs * p.flux / p.j;
+    let caught_up_rad_s = following * p.flux / p.r * CAUGHT_UP;
+    let following_rad_s = caught_up_rad_s.min(square_root(following * p.limit_a));
+    // In turns per period.
+    let omega_n = (following_rad_s * p.t).min(OMEGA_N_SHARE_MAX) / TAU;
+    let turns = |rad_s: f32| rad_s * p.t / TAU;
+    place.half_resistance = p.factor(ParamId::MotRMohm, 0.5 * p.r * p.t * flux_per_current);
+    place.inductance = p.factor(ParamId::MotLUh, inductance);
+    place.bias = p.gain(ParamId::MotLUh, beta);
+    place.omega_min = Speed::from_f32(turns(OMEGA_MIN_RAD_S));
+    place.omega_n_min = Speed::from_f32(turns(OMEGA_N_RAD_S[0]));
+    place.omega_n_per_current = p.gain(
+        ParamId::MotJGcm2,
+        omega_n * (1.0 / FOLLOWING_SHARE) / p.limit_a * p.unit_a,
+    );
+    place.omega_n_following = Speed::from_f32(omega_n);
+    place.omega_n_max = Speed::from_f32(turns(OMEGA_N_RAD_S[1]).max(omega_n));
+    place.smoothing = p.factor(ParamId::PwmFreqHz, SMOOTHING_RAD_S * p.t);
     place.xi_nominal = INVERSE_FLUX_NOMINAL;
     // The stated flux is 2/π.
     place.quarter_per_flux = Multiplier::from_bits(EIGHTH_PI.to_bits());
@@ -116,29 +118,29 @@ fn compensated(p: &Si, place: &mut compensated::Config) {
 
 /// Sets up the adaptive back-EMF observer: (6), (7), (20), (22), (28).
 fn back_emf(p: &Si, place: &mut back_emf::Config) {
-    p.set(Quantity::Decay, settled(value!(p, ROverL * T)));
+    let current_per_voltage = p.unit_v / p.unit_a;
+    let decay = settled(p.r_over_l * p.t);
+    // The time for which a constant derivative acts in a period: (1 − e^(−R·T_s/L))·L/R.
+    let acts_s = decay / p.r_over_l;
+    // λ² + (R/L + k_p)·λ + k_i/L with both poles at (−1 ± i)/ε (20).
+    let k_p = 2.0 * p.current_rad_s - p.r_over_l;
+    let k_i = 2.0 * p.l * p.current_rad_s * p.current_rad_s;
+    // λ² + χ·k_η·λ + χ²·γ with both poles at (−1 ± i)·s (22).
+    let pole_rad_s = ATTITUDE_SHARE * p.current_rad_s;
+    let linearised_rad_s = LINEARISED_SHARE * p.fastest_rpm * p.pole_pairs * TAU / 60.0;
+    let chi = linearised_rad_s * p.flux;
+    let k_eta = 2.0 * pole_rad_s / chi;
+    let gamma = 2.0 * pole_rad_s * pole_rad_s / (chi * chi);
+    let unit_per_wb = p.scale.inverse_flux_per_wb();
     place.delay = p.board.delay;
-    fill!(p, place, {
-        // The time for which a constant derivative acts in a period: (1 − e^(−R·T_s/L))·L/R.
-        define ActsS(Decay / ROverL),
-        gain decay(MotRMohm, Decay),
-        gain admittance(MotLUh, ActsS / L * CurrentPerVoltage),
-        gain rotation(MotLUh, ActsS * RadPerUnit),
-        // λ² + (R/L + k_p)·λ + k_i/L with both poles at (−1 ± i)/ε (20).
-        define KP([2.0] * CurrentRadS - ROverL),
-        gain k_p(CtlBwCurHz, KP * ActsS),
-        gain k_i(CtlBwCurHz, [2.0] * L * CurrentRadS * CurrentRadS * T / CurrentPerVoltage),
-        // λ² + χ·k_η·λ + χ²·γ with both poles at (−1 ± i)·s (22).
-        define Chi(LinearisedRadS * Flux),
-        define ChiSquare(Chi * Chi),
-        define PoleRadS([ATTITUDE_SHARE] * CurrentRadS),
-        gain k_eta(CtlBwCurHz, [2.0] * PoleRadS / Chi * UnitV / RadPerUnit),
-        gain gamma(
-            CtlBwCurHz,
-            [2.0] * PoleRadS * PoleRadS / ChiSquare * T * UnitV / UnitPerWb
-        ),
-        gain k_f(CtlBwCurHz, [FILTER_SHARE] * CurrentRadS * T),
-    });
+    place.decay = p.gain(ParamId::MotRMohm, decay);
+    place.admittance = p.gain(ParamId::MotLUh, acts_s / p.l * current_per_voltage);
+    place.rotation = p.gain(ParamId::MotLUh, acts_s * p.rad_per_unit);
+    place.k_p = p.gain(ParamId::CtlBwCurHz, k_p * acts_s);
+    place.k_i = p.gain(ParamId::CtlBwCurHz, k_i * p.t / current_per_voltage);
+    place.k_eta = p.gain(ParamId::CtlBwCurHz, k_eta * p.unit_v / p.rad_per_unit);
+    place.gamma = p.gain(ParamId::CtlBwCurHz, gamma * p.t * p.unit_v / unit_per_wb);
+    place.k_f = p.gain(ParamId::CtlBwCurHz, FILTER_SHARE * p.current_rad_s * p.t);
     place.xi_nominal = INVERSE_FLUX_NOMINAL;
     place.xi_min = INVERSE_FLUX_NOMINAL / 2;
     // Twice the nominal is one bit more than the type holds.
@@ -146,10 +148,8 @@ fn back_emf(p: &Si, place: &mut back_emf::Config) {
     if p.chosen(CtlObsCure::Cured) {
         let cure = place.cure.insert(Cure::default());
         // The loop that cures the published observer.
-        fill!(p, cure, {
-            define OmegaN([CURE_RAD_S] * T),
-            gain proportional(CtlObsCure, [2.0] * OmegaN / Tau),
-            gain integral(CtlObsCure, OmegaN * OmegaN / Tau),
-        });
+        let omega_n = CURE_RAD_S * p.t;
+        cure.proportional = p.gain(ParamId::CtlObsCure, 2.0 * omega_n / TAU);
+        cure.integral = p.gain(ParamId::CtlObsCure, omega_n * omega_n / TAU);
     }
 }

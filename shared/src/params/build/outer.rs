@@ -1,11 +1,12 @@
 //! Coefficients of the outer loop.
 
-use super::formula::fill;
-use super::quantity::Quantity;
+use core::f32::consts::TAU;
+
 use super::si::Si;
 use crate::control::speed::{Config, Law, feed_forward, nested};
 use crate::control::{planner, torque};
 use crate::math::{Gain, Real};
+use crate::params::ParamId;
 use crate::params::choice::{CtlObserver, CtlRegulator, CtlSpeed};
 use crate::parts;
 use crate::units::Speed;
@@ -24,6 +25,9 @@ const LANDING_SHARE: f32 = 0.6;
 /// corrected in full: 400 rpm on the bench.
 const TRUST_EMF: f32 = 1.5;
 
+/// [`nested::Config::trust`] that corrects speed errors in full from a ten-thousandth of a turn per period.
+const TRUST_ALWAYS: f32 = 5_000.0;
+
 /// Time in which ω̇* rises from zero to the slew, s: a few times the current loop's response.
 const JERK_S: f32 = 0.005;
 
@@ -40,33 +44,28 @@ const MODIFIED_SLOWER: f32 = 4.0;
 
 /// Sets up torque and voltage mode.
 pub(super) fn torque(p: &Si, place: &mut torque::Config) {
-    define_slower(p);
-    fill!(p, place, {
-        define SlowerS([TORQUE_S] * Slower),
-        define SlewAS(LimitA / SlowerS),
-        number slew(SlewAS * OuterT / UnitA),
-        define GrowthAS(Flux / L / [GROWTH_S] min SlewAS),
-        number growth(GrowthAS * OuterT / UnitA),
-    });
+    let slew_a_s = p.limit_a / (TORQUE_S * slower(p));
+    let growth_a_s = (p.flux / p.l / GROWTH_S).min(slew_a_s);
+    place.slew = p.scale.current_from_a(slew_a_s * p.outer_t);
+    place.growth = p.scale.current_from_a(growth_a_s * p.outer_t);
     if !p.is_helped() {
         // Sensors do not take the growth for a turn of the rotor, and the first paper has no such limit.
         place.growth = place.slew;
     }
 }
 
-/// Defines the factor of both times.
-fn define_slower(p: &Si) {
-    let slower = if p.chosen(CtlRegulator::Modified) {
+/// Returns the factor of both times.
+fn slower(p: &Si) -> f32 {
+    if p.chosen(CtlRegulator::Modified) {
         MODIFIED_SLOWER
     } else {
         1.0
-    };
-    p.set(Quantity::Slower, slower);
+    }
 }
 
 /// Sets up the speed regulator that `CTL_SPEED` selects, and its planner.
 pub(super) fn speed(p: &Si, place: &mut Config) {
-    planner(p, Quantity::OuterT, &mut place.planner);
+    planner(p, p.outer_t, &mut place.planner);
     let law = p.choice();
     match law {
         CtlSpeed::Inertia | CtlSpeed::Pi => place.law = Law::Nested(nested::Config::default()),
@@ -83,61 +82,53 @@ pub(super) fn speed(p: &Si, place: &mut Config) {
     }
 }
 
-/// Sets up the planner of a speed regulator that runs once per `period`.
-pub(super) fn planner(p: &Si, period: Quantity, place: &mut planner::Config) {
-    p.set(Quantity::PlannerT, p.of(period));
-    fill!(p, place, { number slew(SlewRpmS * PlannerT * TurnsPerRpm) });
+/// Sets up the planner of a speed regulator that runs once per `period_s`.
+pub(super) fn planner(p: &Si, period_s: f32, place: &mut planner::Config) {
+    place.slew = p.scale.speed_from_rpm(p.settings.slew_rpm_s * period_s);
     // How ω* starts and stops moving: softly, or limited by the slew alone as in the papers.
     match p.choice() {
         CtlSpeed::Inertia => {
-            define_slower(p);
-            p.set(Quantity::Slew, place.slew.to_f32());
-            fill!(p, place, {
-                define SlowerS([JERK_S] * Slower),
-                number jerk(Slew * PlannerT / SlowerS),
-                gain approach(CtlBwSpdHz, [LANDING_SHARE] * SpeedRadS * PlannerT),
-            });
+            let jerk = place.slew.to_f32() * period_s / (JERK_S * slower(p));
+            place.jerk = Speed::from_f32(jerk);
+            place.approach = p.gain(
+                ParamId::CtlBwSpdHz,
+                LANDING_SHARE * p.speed_rad_s * period_s,
+            );
         }
         CtlSpeed::Propeller | CtlSpeed::Pi => {
             place.jerk = Speed::MAX;
-            fill!(p, place, { gain approach(CtlBwSpdHz, [1.0]) });
+            place.approach = p.gain(ParamId::CtlBwSpdHz, 1.0);
         }
     }
 }
 
 /// Sets up (8) with gains in the ratio of Table III.
 fn published(p: &Si, place: &mut nested::Config) {
-    fill!(p, place, {
-        gain k_p(CtlBwSpdHz, J * SpeedRadS * TorquePerSpeed),
-        gain k_i(
-            CtlBwSpdHz,
-            J * SpeedRadS * [SPEED_CORNER_SHARE] * SpeedRadS * OuterT * TorquePerSpeed
-        ),
-        // In full from a ten-thousandth of a turn per period.
-        gain trust(CtlBwSpdHz, [5_000.0]),
-    });
+    let k_p = p.j * p.speed_rad_s;
+    let k_i = k_p * SPEED_CORNER_SHARE * p.speed_rad_s * p.outer_t;
+    place.k_p = p.gain(ParamId::CtlBwSpdHz, k_p * p.torque_per_speed);
+    place.k_i = p.gain(ParamId::CtlBwSpdHz, k_i * p.torque_per_speed);
+    place.trust = p.gain(ParamId::CtlBwSpdHz, TRUST_ALWAYS);
     place.with_step = reads_step(p);
 }
 
 /// Sets up (8) with both poles faster than the trajectory's landing: J·s² + k_pω·s + k_iω.
 fn with_inertia(p: &Si, place: &mut nested::Config) {
-    fill!(p, place, {
-        define PoleRadS([POLE_SHARE] * SpeedRadS),
-        gain k_p(CtlBwSpdHz, [2.0] * PoleRadS * J * TorquePerSpeed),
-        gain k_i(CtlBwSpdHz, PoleRadS * PoleRadS * J * OuterT * TorquePerSpeed),
-        define Inertia(J / OuterT * TorquePerSpeed),
-        gain inertia(MotJGcm2, Inertia),
-        gain inertia_inverse(MotJGcm2, [1.0] / Inertia),
-    });
-    if p.chosen(CtlObserver::Hall) {
+    let pole_rad_s = POLE_SHARE * p.speed_rad_s;
+    let k_p = 2.0 * pole_rad_s * p.j;
+    let k_i = pole_rad_s * pole_rad_s * p.j * p.outer_t;
+    let inertia = p.j / p.outer_t * p.torque_per_speed;
+    place.k_p = p.gain(ParamId::CtlBwSpdHz, k_p * p.torque_per_speed);
+    place.k_i = p.gain(ParamId::CtlBwSpdHz, k_i * p.torque_per_speed);
+    place.inertia = p.gain(ParamId::MotJGcm2, inertia);
+    place.inertia_inverse = p.gain(ParamId::MotJGcm2, 1.0 / inertia);
+    place.trust = if p.chosen(CtlObserver::Hall) {
         // Sensors do not depend on R.
-        fill!(p, place, { gain trust(CtlBwSpdHz, [5_000.0]) });
+        p.gain(ParamId::CtlBwSpdHz, TRUST_ALWAYS)
     } else {
-        fill!(p, place, {
-            define Trusted([TRUST_EMF] * R * RampA / Flux * T / Tau),
-            gain trust(StaRampA, [0.5] / Trusted),
-        });
-    }
+        let trusted_rad_s = TRUST_EMF * p.r * p.settings.ramp_a / p.flux;
+        p.gain(ParamId::StaRampA, 0.5 / (trusted_rad_s * p.t / TAU))
+    };
     place.with_step = reads_step(p);
 }
 
@@ -148,21 +139,19 @@ fn reads_step(p: &Si) -> bool {
 
 /// Sets up the feed-forward loop of the second paper's figure 47.
 fn feed_forward(p: &Si, place: &mut feed_forward::Config) {
-    let fastest = p.scale.speed_from_rpm(p.of(Quantity::FastestRpm));
-    p.set(Quantity::Fastest, fastest.to_f32());
-    fill!(p, place, {
-        define NmPerA([1.5] * PolePairs * Flux),
-        define APerNm([1.0] / NmPerA),
-        define CurrentPerSpeed(UnitRadS / UnitA),
-        gain k_p(CtlBwSpdHz, J * SpeedRadS * APerNm * CurrentPerSpeed),
-        gain k_i(
-            CtlBwSpdHz,
-            J * SpeedRadS * APerNm * [SPEED_CORNER_SHARE] * SpeedRadS * OuterT * CurrentPerSpeed
-        ),
-        define FastestSquare(Fastest * Fastest),
-        gain k_ffi(CtlFfA, PropellerA / UnitA / FastestSquare),
-        gain k_ffv(MotFluxMwb, Flux * Tau / T / UnitV),
-    });
+    let fastest = p.scale.speed_from_rpm(p.fastest_rpm).to_f32();
+    let a_per_nm = 1.0 / (1.5 * p.pole_pairs * p.flux);
+    let k_p = p.j * p.speed_rad_s * a_per_nm;
+    let k_i = k_p * SPEED_CORNER_SHARE * p.speed_rad_s * p.outer_t;
+    let current_per_speed = p.unit_rad_s / p.unit_a;
+    let propeller_a = p.get(ParamId::CtlFfA);
+    place.k_p = p.gain(ParamId::CtlBwSpdHz, k_p * current_per_speed);
+    place.k_i = p.gain(ParamId::CtlBwSpdHz, k_i * current_per_speed);
+    place.k_ffi = p.gain(
+        ParamId::CtlFfA,
+        propeller_a / p.unit_a / (fastest * fastest),
+    );
+    place.k_ffv = p.gain(ParamId::MotFluxMwb, p.flux * TAU / p.t / p.unit_v);
     place.own = if p.chosen(CtlRegulator::Modified) {
         Gain::ZERO
     } else {

@@ -135,20 +135,4 @@ quantities! {
     }
     // Of low speed and the limits.
     own { WindingA, BrakingA, DrivingA, SlowV, RippleA, HiddenA, BiasA, DeadEndV, ReturnV, EndV, EndRadS }
-    // Of the edges.
-    own {
-        StatorFlux, CornerS, Turns, Ae, SlowRadS, TauInt, Edges, Acceleration, Known, Lag,
-        WholeTurnsHz, FilterHz, WholeTurnsRpm, FilterRpm,
-    }
-    // Of the other observers.
-    own { Decay, ActsS, Chi, ChiSquare, OmegaN, Following }
-    // Of the regulators.
-    own { KI, SlopeV, EmfTurns, TurnsPerVoltage }
-    // Of the outer loop.
-    own {
-        SlewAS, GrowthAS, Slower, SlowerS, Slew, PlannerT, Inertia, Trusted, NmPerA, APerNm, Fastest, FastestSquare,
-        CurrentPerSpeed,
-    }
-    // Of the six-step drive.
-    own { CornerRadS, LeastV, GreatestV }
 }

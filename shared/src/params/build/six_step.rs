@@ -4,14 +4,13 @@ use core::f32::consts::TAU;
 
 use fixed::types::I1F31;
 
-use super::formula::{fill, value};
 use super::outer;
-use super::quantity::Quantity;
 use super::si::{Si, TEST_SHARE, TOO_FEW_PERIODS};
 use crate::control::delay::Delay;
 use crate::drive::config::six_step::Config;
 use crate::math::Real;
 use crate::params::ParamId;
+use crate::units::Charge;
 
 /// Least voltage on the floating terminal that counts as back-EMF, V, and the same in counts: above noise and the
 /// difference between the conducting switches.
@@ -55,45 +54,40 @@ const BRAKING_SHARE: f32 = 0.25;
 
 pub(super) fn six_step(p: &Si, duty_max: f32, place: &mut Config) {
     p.refuse_above(
-        value!(p, [6.0] * FastestTurns * [LEAST_PERIODS]),
+        6.0 * p.fastest_turns * LEAST_PERIODS,
         1.0,
         ParamId::PwmFreqHz,
         TOO_FEW_PERIODS,
     );
-    outer::planner(p, Quantity::T, &mut place.planner);
+    outer::planner(p, p.t, &mut place.planner);
     let crossing = &mut place.crossing;
-    fill!(p, crossing, {
-        define LeastV([LEAST_COUNTS] * TerminalVPerCount max [LEAST_V]),
-        number least(LeastV / UnitV),
-        define GreatestV([GREATEST_COUNTS] * TerminalVPerCount),
-        number greatest(GreatestV / UnitV),
-    });
+    let v_per_count = p.board.terminal_v_per_count;
+    crossing.least = p.voltage((LEAST_COUNTS * v_per_count).max(LEAST_V));
+    crossing.greatest = p.voltage(GREATEST_COUNTS * v_per_count);
     crossing.delayed = match p.board.delay {
         Delay::None(_) | Delay::Half(_) => 0,
         Delay::One => 1,
     };
     let duty = &mut place.duty;
-    fill!(p, duty, {
-        define KP([PROPORTIONAL] / FastestTurns),
-        define CornerRadS([CORNER_SHARE * TAU] * SpeedHz),
-        define BoundA(LimitA max [BOUND_LEAST_A]),
-        gain k_p(CtlRpmMax, KP),
-        gain k_i(CtlBwSpdHz, KP * CornerRadS * T),
-        gain k_b(LimPhaseA, [BOUND_RATE] * T * UnitA / BoundA),
-        number lead_to_zero_max([LEAD_SHARE] * LimitA / UnitA),
-    });
+    let k_p = PROPORTIONAL / p.fastest_turns;
+    let corner_rad_s = CORNER_SHARE * TAU * p.settings.speed_hz;
+    let bound_a = p.limit_a.max(BOUND_LEAST_A);
+    duty.k_p = p.gain(ParamId::CtlRpmMax, k_p);
+    duty.k_i = p.gain(ParamId::CtlBwSpdHz, k_p * corner_rad_s * p.t);
+    duty.k_b = p.gain(ParamId::LimPhaseA, BOUND_RATE * p.t * p.unit_a / bound_a);
+    duty.lead_to_zero_max = p.scale.current_from_a(LEAD_SHARE * p.limit_a);
     duty.duty_max = I1F31::from_f32(duty_max);
     place.delay = p.board.delay;
     place.patience = p.periods(PATIENCE_S) as u16;
     place.astray = p.periods(ASTRAY_S) as u16;
-    fill!(p, place, {
-        gain terminal(LimBusVMax, TerminalVPerCount / UnitV),
-        number braking([BRAKING_SHARE] * LimitA / UnitA),
-        number start_current(StartA / UnitA),
-        number test_current([TEST_SHARE] * LimitA / UnitA),
-        gain ramp(StaRampRpmS, RampRpmS * T * PolePairs * T / [60.0] * UnitA / RampA),
-        charge park_charge(ParkAs / UnitAs),
-        number run_speed(RunRpm * TurnsPerRpm),
-        number slow(SlowRpm * TurnsPerRpm),
-    });
+    let settings = &p.settings;
+    let ramp = settings.ramp_rpm_s * p.t * p.pole_pairs * p.t / 60.0;
+    place.terminal = p.gain(ParamId::LimBusVMax, v_per_count / p.unit_v);
+    place.braking = p.scale.current_from_a(BRAKING_SHARE * p.limit_a);
+    place.start_current = p.scale.current_from_a(p.start_a);
+    place.test_current = p.scale.current_from_a(TEST_SHARE * p.limit_a);
+    place.ramp = p.gain(ParamId::StaRampRpmS, ramp * p.unit_a / settings.ramp_a);
+    place.park_charge = Charge::from_f32(settings.park_as / p.unit_as);
+    place.run_speed = p.scale.speed_from_rpm(settings.run_rpm);
+    place.slow = p.scale.speed_from_rpm(p.slow_rpm);
 }
