@@ -25,7 +25,6 @@ pub use number::Number;
 pub use product::{EIGHTH_PI, TopProduct, TopSum};
 pub use quantity::{Quantity, Times};
 pub use quotient::{divide, quotient};
-pub(crate) use real::whole;
 pub use real::{Real, round};
 pub use root::{magnitude, other_leg};
 pub use trig::{Angle, SinCos, Turn, atan2_turns, sin_cos};

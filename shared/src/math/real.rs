@@ -47,7 +47,7 @@ impl<F: Unsigned> Real for FixedI64<F> {
 
 /// Returns the bits of a number with this many binary places. Never inlined: every coefficient calls it.
 #[inline(never)]
-pub(crate) fn whole(value: f32, places: i32) -> i32 {
+fn whole(value: f32, places: i32) -> i32 {
     libm::rintf(value * power_of_two(places)) as i32
 }
 

@@ -3,7 +3,8 @@
 //! By [`FromMotor`](crate::params::FromMotor)'s formulas it starts with 8 A, which drop 0.264 V; the dead time takes
 //! 4/π·200 ns·48 kHz·20 V, 0.2445 V; at the least speed the back-EMF is 1.5·0.264 V and a quarter of that, 0.4571 V.
 
-use super::quantity::Quantity;
+use core::f32::consts::TAU;
+
 use super::si::Si;
 use super::{low_speed, observer, outer, sensing, start};
 use crate::control::speed::Bounds;
@@ -21,10 +22,7 @@ fn made<T>(changes: &[(ParamId, f32)], block: impl FnOnce(&Si) -> T) -> T {
     for (id, value) in RACING.iter().chain(changes) {
         params.set(*id, *value).expect("in range");
     }
-    let (made, quantities) = (params.in_force(), Si::quantities());
-    let p = Si::new(&made, &Board::BENCH, Drift::NONE, &quantities);
-    p.prepare(Drift::NONE);
-    block(&p)
+    block(&Si::new(&params.in_force(), &Board::BENCH, Drift::NONE))
 }
 
 fn near(what: &str, got: f32, wanted: f32) {
@@ -52,7 +50,7 @@ fn most_a(changes: &[(ParamId, f32)]) -> [f32; 2] {
 
 /// Returns the bounds that `LIM_PHASE_A` alone sets.
 fn limits(p: &Si) -> Bounds {
-    let limit = p.scale.current_from_a(p.of(Quantity::LimitA));
+    let limit = p.scale.current_from_a(p.limit_a);
     Bounds {
         min: -limit,
         max: limit,
@@ -109,7 +107,7 @@ fn rates_a_s(changes: &[(ParamId, f32)]) -> [f32; 2] {
     made(changes, |p| {
         let mut place = torque::Config::default();
         outer::torque(p, &mut place);
-        [place.slew, place.growth].map(|step| p.scale.amperes(step) / p.of(Quantity::OuterT))
+        [place.slew, place.growth].map(|step| p.scale.amperes(step) / p.outer_t)
     })
 }
 
@@ -158,10 +156,7 @@ fn the_six_step_bound_looks_towards_zero_by_a_quarter_of_the_limit() {
         super::six_step::six_step(p, 0.9, &mut place);
         let duty = &place.duty;
         let per_period: f32 = duty.k_b.held(p.scale.current_from_a(20.0)).to_num();
-        [
-            p.scale.amperes(duty.lead_to_zero_max),
-            p.of(Quantity::T) / per_period,
-        ]
+        [p.scale.amperes(duty.lead_to_zero_max), p.t / per_period]
     });
     near("lead", lead_a, 2.0);
     // With 20 A to the bound, which counts where the limit is less.
@@ -185,9 +180,9 @@ fn omega_n(changes: &[(ParamId, f32)]) -> [f32; 2] {
         let observers::Config::Compensated(place) = place else {
             panic!("it is the default");
         };
-        let per_s = p.of(Quantity::Tau) / p.of(Quantity::T);
+        let per_s = TAU / p.t;
         // A fifth of the limit asks for all of it.
-        let fifth = p.scale.current_from_a(p.of(Quantity::LimitA) / 5.0);
+        let fifth = p.scale.current_from_a(p.limit_a / 5.0);
         let following = place.omega_n_per_current.saturating_apply(fifth);
         let [following, bound, most] = [following, place.omega_n_following, place.omega_n_max]
             .map(|turns| turns.to_num::<f32>() * per_s);
@@ -221,7 +216,7 @@ fn the_compensation_is_whole_from_a_current_that_the_supply_makes_in_a_dead_time
             let mut place = dead_time::Config::default();
             sensing::dead_time(p, &mut place);
             let certainty = place.certainty.apply(Current::from_num(0.01));
-            0.01 / certainty.to_num::<f32>() * p.of(Quantity::UnitA)
+            0.01 / certainty.to_num::<f32>() * p.unit_a
         })
     };
     near("certain", certain_a(&[]), 0.2);

@@ -78,8 +78,7 @@ impl FluxSettings {
     /// acceleration that the drive commands.
     pub fn new(params: &Params) -> Self {
         // They are the same on any board.
-        let quantities = Si::quantities();
-        Self::of(&Si::new(params, &Board::BENCH, Drift::NONE, &quantities))
+        Self::of(&Si::new(params, &Board::BENCH, Drift::NONE))
     }
 
     fn of(p: &Si) -> Self {

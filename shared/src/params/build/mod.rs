@@ -1,15 +1,19 @@
 //! Builds the configuration from the parameters: SI values become the control's coefficients, once.
+//!
+//! [`Si`] holds the quantities that several blocks share; each block computes its coefficients from them, in single
+//! precision, in SI and in the order in which they are written, so that chip and PC find the same bits. A coefficient
+//! that leaves its range refuses the parameter to change, and the first refusal counts.
+
+use core::f32::consts::TAU;
 
 mod base;
 #[cfg(test)]
 mod by_hand;
 mod flux;
-mod formula;
 mod inductance;
 mod input;
 mod observer;
 mod outer;
-mod quantity;
 mod regulator;
 mod sensing;
 mod si;
@@ -18,9 +22,7 @@ mod start;
 mod tone;
 
 pub use flux::FluxSettings;
-use formula::{fill, formulas, refuse};
 pub use input::input;
-use quantity::Quantity;
 pub(crate) use sensing::unbalance_max;
 pub use si::{BuildError, scale};
 use si::{Si, TEST_SHARE, TOO_FEW_PERIODS};
@@ -37,7 +39,7 @@ use crate::input::signal::Signal;
 use crate::math::Real;
 use crate::parts;
 use crate::protection;
-use crate::units::{Current, Scale, Voltage, stated_emf};
+use crate::units::{AdcCounts, Current, Scale, Voltage, stated_emf};
 
 /// Fastest rotor that six edges per turn can follow, turns per period: two periods per edge.
 const EDGES_TURNS: f32 = 1.0 / 12.0;
@@ -138,9 +140,7 @@ pub fn build_in(
     place: &mut Config,
 ) -> Result<(), BuildError> {
     let made = params.in_force();
-    let quantities = Si::quantities();
-    let p = Si::new(&made, board, drift, &quantities);
-    p.prepare(drift);
+    let p = Si::new(&made, board, drift);
     if let Some(unknown) = params.unknown() {
         p.refuse_if(
             p.chosen(CtlDrive::FieldOriented),
@@ -168,7 +168,7 @@ pub fn build_in(
         MotStop::Brake => Stop::Brake,
     };
     place.delay = board.delay;
-    fill!(p, place, { factor bus(LimBusVMax, BusVPerCount / UnitV) });
+    place.bus = p.factor(ParamId::LimBusVMax, board.bus_v_per_count / p.unit_v);
     observer::observer(&p, &mut place.observer);
     regulator::regulator(&p, &mut place.regulator);
     outer::speed(&p, &mut place.speed);
@@ -182,19 +182,17 @@ pub fn build_in(
     }
     place.test_current = test_current(params, &p.scale);
     place.both_ways = p.chosen(Inp3d::On);
-    fill!(p, place, {
-        number slow(SlowRpm * TurnsPerRpm),
-        gain coast(PwmFreqHz, T / [COAST_S]),
-        count clear_periods([CLEAR_S] / T),
-        count proven_periods([PROVEN_S] / T),
-        count lost_periods([LOST_S] / T),
-    });
+    place.slow = p.scale.speed_from_rpm(p.slow_rpm);
+    place.coast = p.gain(ParamId::PwmFreqHz, p.t / COAST_S);
+    place.clear_periods = p.periods(CLEAR_S);
+    place.proven_periods = p.periods(PROVEN_S);
+    place.lost_periods = p.periods(LOST_S);
     place.modulator = modulator::Config::new(
         modulation,
         duty_max,
         match board.shunts {
             // The dead-time compensation adds to what the vector takes.
-            Shunts::Three => window - p.of(Quantity::DeadShare),
+            Shunts::Three => window - p.dead_share,
             Shunts::Two => 0.0,
         },
     );
@@ -246,32 +244,69 @@ pub(crate) fn lost_periods(scale: &Scale) -> u32 {
 
 /// Refuses values that are wrong whatever the coefficients.
 fn refuse_contradictions(p: &Si) {
+    let above = |value, limit, param, reason| p.refuse_above(value, limit, param, reason);
+    let (settings, supply_max_v) = (&p.settings, p.supply_max_v);
     p.refuse_if(
-        p.of(Quantity::SupplyMinV) >= p.of(Quantity::SupplyMaxV),
+        p.get(ParamId::LimBusVMin) >= supply_max_v,
         ParamId::LimBusVMin,
         "not below LIM_BUS_V_MAX",
     );
-    refuse!(p, {
-        PwmFreqHz([BUS_UNITS_MAX] * UnitV - SupplyMaxV) "too low for this flux and LIM_BUS_V_MAX",
-        PwmFreqHz(SupplyMaxV / [BUS_UNITS_MIN] - UnitV) "too high for this flux and LIM_BUS_V_MAX",
-        CtlRpmMin(FastestRpm - LeastRpm) ABOVE_FASTEST,
-        StaRunRpm(FastestRpm - RunRpm) ABOVE_FASTEST,
-        CtlBwCurHz([BANDWIDTH_SHARE] * PwmHz - CurrentHz) "above a twentieth of PWM_FREQ_HZ",
-        CtlBwSpdHz([SPEED_SHARE] * CurrentHz - SpeedHz) "above a fifth of CTL_BW_CUR_HZ",
-        LimPhaseA([SHOWN_SHARE / TRIP_SHARE] * RangeA - LimitA)
-            "its trip is beyond the board",
-        PwmFreqHz([0.25] - FastestTurns) TOO_FEW_PERIODS,
-    });
-    p.refuse_above(
+    above(
+        supply_max_v,
+        BUS_UNITS_MAX * p.unit_v,
+        ParamId::PwmFreqHz,
+        "too low for this flux and LIM_BUS_V_MAX",
+    );
+    above(
+        p.unit_v,
+        supply_max_v / BUS_UNITS_MIN,
+        ParamId::PwmFreqHz,
+        "too high for this flux and LIM_BUS_V_MAX",
+    );
+    above(
+        settings.least_rpm,
+        p.fastest_rpm,
+        ParamId::CtlRpmMin,
+        ABOVE_FASTEST,
+    );
+    above(
+        settings.run_rpm,
+        p.fastest_rpm,
+        ParamId::StaRunRpm,
+        ABOVE_FASTEST,
+    );
+    above(
+        settings.current_hz,
+        BANDWIDTH_SHARE * p.get(ParamId::PwmFreqHz),
+        ParamId::CtlBwCurHz,
+        "above a twentieth of PWM_FREQ_HZ",
+    );
+    above(
+        settings.speed_hz,
+        SPEED_SHARE * settings.current_hz,
+        ParamId::CtlBwSpdHz,
+        "above a fifth of CTL_BW_CUR_HZ",
+    );
+    above(
+        p.limit_a,
+        SHOWN_SHARE / TRIP_SHARE * p.board.current_range_a,
+        ParamId::LimPhaseA,
+        "its trip is beyond the board",
+    );
+    above(p.fastest_turns, 0.25, ParamId::PwmFreqHz, TOO_FEW_PERIODS);
+    above(
         p.board.least_dead_time.ns,
         p.get(ParamId::PwmDeadtimeNs),
         ParamId::PwmDeadtimeNs,
         p.board.least_dead_time.refusal,
     );
     if p.chosen(CtlObserver::FluxCrossings) || p.chosen(CtlObserver::Hall) {
-        refuse!(p, {
-            PwmFreqHz([EDGES_TURNS] - FastestTurns) TOO_FEW_PERIODS,
-        });
+        above(
+            p.fastest_turns,
+            EDGES_TURNS,
+            ParamId::PwmFreqHz,
+            TOO_FEW_PERIODS,
+        );
     }
     let protocol = p.params.number(ParamId::InpProto);
     p.refuse_if(
@@ -284,7 +319,7 @@ fn refuse_contradictions(p: &Si) {
 /// Returns the least voltage along q in voltage mode.
 fn least_u_q(p: &Si) -> Voltage {
     if p.is_helped() {
-        stated_emf(p.scale.speed_from_rpm(p.of(Quantity::LeastRpm)))
+        stated_emf(p.scale.speed_from_rpm(p.settings.least_rpm))
     } else {
         Voltage::ZERO
     }
@@ -292,53 +327,56 @@ fn least_u_q(p: &Si) -> Voltage {
 
 /// Keeps a back-EMF-based observer in lock where there is little back-EMF.
 fn low_speed(p: &Si) -> low_speed::Config {
-    let formulas = formulas!(p, {
-        number limit(LimitA / UnitA),
-        // A current whose flux exceeds the rotor's takes more voltage than the rotor induces: the supply cannot hold it
-        // in braking.
-        define WindingA(Flux / L),
-        define BrakingA(WindingA min LimitA),
-        number braking(BrakingA / UnitA),
-        define DrivingA([DRIVING_SHARE] * WindingA min LimitA),
-        number driving(DrivingA / UnitA),
-        // At the least speed each phase current has a clear sign except briefly: it exceeds the PWM ripple, and the
-        // more the dead time costs, the shorter it is without one.
-        define SlowV(LeastRpm * PolePairs * Tau / [60.0] * Flux),
-        define RippleA(SlowV * T / L),
-        define HiddenA(DeadV - SlowV / R * [BIAS_SHARE]),
-        define BiasA([BIAS_SHARE] * StartA max RippleA max HiddenA min StartA),
-        define DeadEndV([BIAS_DEAD_END] * DeadV),
-        define EndV([BIAS_END] * R * BiasA max DeadEndV),
-        define EndRadS(EndV / Flux),
-        number i_d(BiasA / UnitA),
-        gain i_d_slope(StaRampA, BiasA / UnitA / EndRadS * RadPerUnit),
-        number i_q([TORQUE_LEAST_SHARE] * StartA / UnitA),
-        gain i_q_slope(MotRMohm, [TORQUE_DROP_SHARE] * Flux / R * RadPerUnit / UnitA),
-    });
-    let limit = formulas.number();
+    let current = |amperes| p.scale.current_from_a(amperes);
+    let limit = current(p.limit_a);
     if !p.is_helped() {
         return low_speed::Config::none(limit);
     }
-    let most = [formulas.number(), formulas.number()];
-    let i_d = (formulas.number(), formulas.gain());
-    let i_q = (formulas.number(), formulas.gain());
-    low_speed::Config::new(i_d, i_q, (most, limit))
+    // A current whose flux exceeds the rotor's takes more voltage than the rotor induces: the supply cannot hold it in
+    // braking.
+    let winding_a = p.flux / p.l;
+    let braking_a = winding_a.min(p.limit_a);
+    let driving_a = (DRIVING_SHARE * winding_a).min(p.limit_a);
+    // At the least speed each phase current has a clear sign except briefly: it exceeds the PWM ripple, and the more
+    // the dead time costs, the shorter it is without one.
+    let dead_v = p.settings.dead_v;
+    let slow_v = p.settings.least_rpm * p.pole_pairs * TAU / 60.0 * p.flux;
+    let ripple_a = slow_v * p.t / p.l;
+    let hidden_a = (dead_v - slow_v) / p.r * BIAS_SHARE;
+    let bias_a = (BIAS_SHARE * p.start_a)
+        .max(ripple_a)
+        .max(hidden_a)
+        .min(p.start_a);
+    let end_v = (BIAS_END * p.r * bias_a).max(BIAS_DEAD_END * dead_v);
+    let end_rad_s = end_v / p.flux;
+    let i_d_slope = bias_a / p.unit_a / end_rad_s * p.rad_per_unit;
+    let i_q_slope = TORQUE_DROP_SHARE * p.flux / p.r * p.rad_per_unit / p.unit_a;
+    low_speed::Config::new(
+        (current(bias_a), p.gain(ParamId::StaRampA, i_d_slope)),
+        (
+            current(TORQUE_LEAST_SHARE * p.start_a),
+            p.gain(ParamId::MotRMohm, i_q_slope),
+        ),
+        ([current(braking_a), current(driving_a)], limit),
+    )
 }
 
 fn limits(p: &Si, place: &mut protection::Config) {
-    fill!(p, place, {
-        number trip([TRIP_SHARE] * LimitA / APerCount),
-        number bus_min(SupplyMinV / UnitV),
-        number bus_max(SupplyMaxV / UnitV),
-        number phase(LimitA / UnitA),
-        number bus_draw(SupplyA / UnitA),
-        number bus_return(RegenA / UnitA),
-        define ReturnV(SupplyMaxV - [RETURN_BAND_V]),
-        number bus_return_v(ReturnV / UnitV),
-        gain bus_return_slope(LimRegenA, RegenA / [RETURN_V] * UnitV / UnitA),
-        gain burn_slope(LimPhaseA, [BURN_SHARE / RETURN_BAND_V] * LimitA * UnitV / UnitA),
-        factor bound_rate(PwmFreqHz, [BOUND_RATE] * T),
-    });
+    let current = |id| p.scale.current_from_a(p.get(id));
+    let regen_a = p.get(ParamId::LimRegenA);
+    place.trip = AdcCounts::from_f32(TRIP_SHARE * p.limit_a / p.board.current_a_per_count);
+    place.bus_min = p.voltage(p.get(ParamId::LimBusVMin));
+    place.bus_max = p.voltage(p.supply_max_v);
+    place.phase = current(ParamId::LimPhaseA);
+    place.bus_draw = current(ParamId::LimBusA);
+    place.bus_return = current(ParamId::LimRegenA);
+    place.bus_return_v = p.voltage(p.supply_max_v - RETURN_BAND_V);
+    place.bus_return_slope = p.gain(ParamId::LimRegenA, regen_a / RETURN_V * p.unit_v / p.unit_a);
+    place.burn_slope = p.gain(
+        ParamId::LimPhaseA,
+        BURN_SHARE / RETURN_BAND_V * p.limit_a * p.unit_v / p.unit_a,
+    );
+    place.bound_rate = p.factor(ParamId::PwmFreqHz, BOUND_RATE * p.t);
 }
 
 #[cfg(test)]

@@ -5,7 +5,6 @@ use core::f32::consts::FRAC_PI_2;
 
 use fixed::types::extra::Unsigned;
 
-use super::quantity::Quantity;
 use crate::math::{Gain, Multiplier, Number, Real, gain_parts};
 use crate::params::board::Board;
 use crate::params::choice::{CtlObsCure, CtlObserver};
@@ -37,17 +36,13 @@ pub(super) const LINEARISED_SHARE: f32 = 0.75;
 pub(super) const SLOW_SHARE: f32 = 0.5;
 
 /// The reason for most refusals.
-pub(super) const OUT_OF_RANGE: &str = "makes a coefficient leave its range";
+const OUT_OF_RANGE: &str = "makes a coefficient leave its range";
 
 /// The source of the coefficients: the shared quantities in SI, the parameters, the board and the units.
 pub(super) struct Si<'a> {
     pub(super) params: &'a Params,
     pub(super) board: &'a Board,
     pub(super) scale: Scale,
-    /// The quantities that formulas are made of.
-    pub(super) quantities: &'a [Cell<f32>; Quantity::COUNT],
-    /// The formulas to be evaluated next.
-    pub(super) formulas: Cell<&'static [u8]>,
     /// The settings that may follow from the motor.
     pub(super) settings: FromMotor,
     /// R, Ω.
@@ -110,21 +105,6 @@ pub(super) struct Si<'a> {
 }
 
 impl Si<'_> {
-    /// Creates room for the quantities.
-    pub(super) fn quantities() -> [Cell<f32>; Quantity::COUNT] {
-        [const { Cell::new(0.0) }; Quantity::COUNT]
-    }
-
-    /// Returns the value of a quantity.
-    pub(super) fn of(&self, quantity: Quantity) -> f32 {
-        self.quantities[usize::from(quantity.0)].get()
-    }
-
-    /// Sets the value of a quantity.
-    pub(super) fn set(&self, quantity: Quantity, value: f32) {
-        self.quantities[usize::from(quantity.0)].set(value);
-    }
-
     pub(super) fn get(&self, id: ParamId) -> f32 {
         self.params.get(id)
     }
@@ -242,8 +222,7 @@ mod tests {
     /// Returns what a test's coefficients refuse first.
     fn refused(test: impl FnOnce(&Si)) -> Option<BuildError> {
         let params = Params::of(&BOSSO_BENCH);
-        let quantities = Si::quantities();
-        let p = Si::new(&params, &Board::BENCH, Drift::NONE, &quantities);
+        let p = Si::new(&params, &Board::BENCH, Drift::NONE);
         test(&p);
         p.refused.get()
     }
