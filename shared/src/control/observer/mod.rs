@@ -57,28 +57,11 @@ pub struct State {
     pub slow_estimate: SlowEstimate,
 }
 
-/// An observer in a control period: the selected one, or one known at compile time.
-pub trait Observer {
+impl Config {
     /// Advances the observer from the last sample to this one. `imposed` is the speed that an open-loop start
     /// imposes on the rotor.
-    fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate;
-
-    /// Returns true if observation during alignment counts; otherwise [`begin_aligned`] restarts the observer.
-    fn follows_park(&self) -> bool;
-
-    /// Returns the current regulator's feedback: the speed of the control's frame, the measured current in it, and
-    /// the observer's estimates.
-    fn feedback(&self, state: &State, frame: (Speed, Dq<Current>), inductance: Factor) -> Feedback;
-
-    /// Tells the observer the voltage `u` commanded in this period, in the feedback's frame. Only the adaptive
-    /// back-EMF observer works in that frame.
-    fn advance(&self, state: &mut State, fb: &Feedback, u: Dq<Voltage>);
-}
-
-impl Observer for Config {
-    // One copy for all callers.
-    #[inline(never)]
-    fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate {
+    #[inline(always)] // in each period
+    pub fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate {
         match self {
             Self::BackEmf(config, _) => {
                 let (estimate, slow) =
@@ -112,12 +95,15 @@ impl Observer for Config {
         }
     }
 
-    fn follows_park(&self) -> bool {
+    /// Returns true if observation during alignment counts; otherwise [`begin_aligned`] restarts the observer.
+    pub fn follows_park(&self) -> bool {
         !matches!(self, Self::Compensated(_))
     }
 
-    #[inline(always)] // in the longest period
-    fn feedback(
+    /// Returns the current regulator's feedback: the speed of the control's frame, the measured current in it, and
+    /// the observer's estimates.
+    #[inline(always)] // in each period
+    pub fn feedback(
         &self,
         state: &State,
         (omega, i): (Speed, Dq<Current>),
@@ -130,7 +116,11 @@ impl Observer for Config {
                 (state.back_emf.i, Dq { d, q })
             }
             Self::Edges(_) | Self::Given(_) => (i, emf(omega, FLUX_NOMINAL)),
-            Self::Compensated(config) => return config.feedback(state, (omega, i), inductance),
+            Self::Compensated(_) => {
+                let d = WideVoltage::ZERO;
+                let q = state.compensated.emf().wrapping_neg();
+                (i, Dq { d, q })
+            }
         };
         Feedback {
             omega,
@@ -141,45 +131,16 @@ impl Observer for Config {
         }
     }
 
-    fn advance(&self, state: &mut State, fb: &Feedback, u: Dq<Voltage>) {
+    /// Tells the observer the voltage `u` commanded in this period, in the feedback's frame. Only the adaptive
+    /// back-EMF observer works in that frame.
+    #[inline(always)] // in each period
+    pub fn advance(&self, state: &mut State, fb: &Feedback, u: Dq<Voltage>) {
         if let Self::BackEmf(config, _) = self {
             back_emf::advance(config, &mut state.back_emf, fb, u);
         }
     }
-}
 
-impl Observer for compensated::Config {
-    #[inline(always)] // in each period
-    fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate {
-        compensated::estimate(self, &mut state.compensated, input, imposed)
-    }
-
-    #[inline(always)] // in each period
-    fn follows_park(&self) -> bool {
-        false
-    }
-
-    #[inline(always)] // in each period
-    fn feedback(&self, state: &State, frame: (Speed, Dq<Current>), inductance: Factor) -> Feedback {
-        let (omega, i) = frame;
-        Feedback {
-            omega,
-            i,
-            i_hat: i,
-            h_hat: Dq {
-                d: WideVoltage::ZERO,
-                q: state.compensated.emf().wrapping_neg(),
-            },
-            inductance,
-        }
-    }
-
-    #[inline(always)] // in each period
-    fn advance(&self, _: &mut State, _: &Feedback, _: Dq<Voltage>) {}
-}
-
-impl Config {
-    /// Returns true if [`Observer::advance`] has any effect: only the adaptive back-EMF observer works in the control's
+    /// Returns true if [`Config::advance`] has any effect: only the adaptive back-EMF observer works in the control's
     /// frame.
     pub fn works_in_frame(&self) -> bool {
         matches!(self, Self::BackEmf(..))

@@ -1,7 +1,7 @@
 //! Current regulators: from the reference current to the voltage.
 //!
 //! All three take the same [`Reference`] and [`Feedback`], and each holds two integrators. A period is
-//! [`Regulator::voltage`], [`Regulator::integrate`], and [`Regulator::anti_windup`] where the modulator's limit cuts
+//! [`Config::voltage`], [`Config::integrate`], and [`Config::anti_windup`] where the modulator's limit cuts
 //! something off.
 
 pub mod modified;
@@ -43,22 +43,10 @@ traced! {
     }
 }
 
-/// A current regulator in a control period: the selected one, or one known at compile time.
-pub trait Regulator {
+impl Config {
     /// Returns the voltage that drives the currents to their references, before any limit.
-    fn voltage(&self, state: &State, reference: &Reference, fb: &Feedback) -> Dq<WideVoltage>;
-
-    /// Advances the integrators by one period.
-    fn integrate(&self, state: &mut State, reference: &Reference, fb: &Feedback);
-
-    /// Corrects [`Regulator::integrate`] for the voltage that the limit cut off. The integrators continue as if only
-    /// the current within reach of the remaining voltage had been demanded, so they respond at once when the demand
-    /// falls.
-    fn anti_windup(&self, state: &mut State, cut: Dq<WideVoltage>);
-}
-
-impl Regulator for Config {
-    fn voltage(&self, state: &State, reference: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
+    #[inline(always)] // in each period
+    pub fn voltage(&self, state: &State, reference: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
         let u = match self {
             Self::ObserverBased(c, _) => c.voltage(&state.observer_based, reference, fb),
             Self::Synchronous(c) => return c.voltage(&state.synchronous, reference, fb),
@@ -70,7 +58,9 @@ impl Regulator for Config {
         }
     }
 
-    fn integrate(&self, state: &mut State, reference: &Reference, fb: &Feedback) {
+    /// Advances the integrators by one period.
+    #[inline(always)] // in each period
+    pub fn integrate(&self, state: &mut State, reference: &Reference, fb: &Feedback) {
         match self {
             Self::ObserverBased(c, _) => c.integrate(&mut state.observer_based, reference, fb),
             Self::Synchronous(c) => c.integrate(&mut state.synchronous, reference, fb),
@@ -78,33 +68,17 @@ impl Regulator for Config {
         }
     }
 
-    fn anti_windup(&self, state: &mut State, cut: Dq<WideVoltage>) {
+    /// Corrects [`Config::integrate`] for the voltage that the limit cut off. The integrators continue as if only the
+    /// current within reach of the remaining voltage had been demanded, so they respond at once when the demand falls.
+    pub fn anti_windup(&self, state: &mut State, cut: Dq<WideVoltage>) {
         match self {
             Self::ObserverBased(c, _) => c.anti_windup(&mut state.observer_based, cut),
             Self::Synchronous(c) => c.anti_windup(&mut state.synchronous, cut),
             Self::Modified(c, _) => c.anti_windup(&mut state.modified, cut),
         }
     }
-}
 
-impl Regulator for synchronous::Config {
-    #[inline(always)] // in each period
-    fn voltage(&self, state: &State, reference: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
-        Self::voltage(self, &state.synchronous, reference, fb)
-    }
-
-    #[inline(always)] // in each period
-    fn integrate(&self, state: &mut State, reference: &Reference, fb: &Feedback) {
-        Self::integrate(self, &mut state.synchronous, reference, fb);
-    }
-
-    fn anti_windup(&self, state: &mut State, cut: Dq<WideVoltage>) {
-        Self::anti_windup(self, &mut state.synchronous, cut);
-    }
-}
-
-impl Config {
-    /// Returns the i_q* at which [`Regulator::voltage`] gives `u_q` along q (for the modified regulator, the
+    /// Returns the i_q* at which [`Config::voltage`] gives `u_q` along q (for the modified regulator, the
     /// voltage's length), whatever i_q* `reference` has.
     ///
     /// Regulated this way, the current goes where the voltage takes it, and a bound on i_q* bounds the current,
@@ -124,7 +98,7 @@ impl Config {
         }
     }
 
-    /// Presets the integrators so that [`Regulator::voltage`] is `u`: a bumpless takeover from whatever applied
+    /// Presets the integrators so that [`Config::voltage`] is `u`: a bumpless takeover from whatever applied
     /// that voltage.
     ///
     /// The modified regulator takes over within a quarter turn of the q axis, with either sign.

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::{L, P, PHI, R, TS, Units};
 use crate::control::inductance::Factor;
 use crate::control::modulator::{self, VectorLimit};
-use crate::control::regulator::{Feedback, Reference, Regulator, State};
+use crate::control::regulator::{Feedback, Reference, State};
 use crate::control::transform::Dq;
 use crate::units::{Current, Voltage, WideVoltage, narrow};
 

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use super::motor::{Loop, Motor};
 use super::{K_IE, K_PE, L, P, PHI, R, TABLE_III, TS, Units, config_with, near};
 use crate::control::inductance::Factor;
-use crate::control::regulator::{Feedback, Reference, Regulator, State};
+use crate::control::regulator::{Feedback, Reference, State};
 use crate::control::transform::Dq;
 use crate::params::ParamId;
 use crate::units::{Current, Voltage, WideVoltage};

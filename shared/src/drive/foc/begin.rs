@@ -3,7 +3,7 @@
 use super::outer_loop::{self, PREPARATION_PIECES};
 use super::state::State;
 use crate::control::catch::Rotor;
-use crate::control::observer::{self, Observer};
+use crate::control::observer;
 use crate::control::regulator::Reference;
 use crate::control::transform::{AlphaBeta, Dq, PhaseOrder, inverse_park, rotate, voltages};
 use crate::drive::config::{Config, Direction};

@@ -3,7 +3,6 @@
 use super::current_loop::input;
 use super::outer_loop::{self, PREPARATION_PIECES};
 use super::state::State;
-use crate::control::observer::Observer;
 use crate::control::transform::{AlphaBeta, Dq, clarke_in, park};
 use crate::drive::config::Config;
 use crate::drive::io::Sample;

@@ -2,8 +2,7 @@
 
 use super::state::{Loops, State};
 use crate::control::delay::Delay;
-use crate::control::observer::{Input, Observer};
-use crate::control::regulator::Regulator;
+use crate::control::observer::Input;
 use crate::control::transform::{AlphaBeta, Dq, PhaseOrder, inverse_park, park, rotate, voltages};
 use crate::control::{modulator, start};
 use crate::drive::config::Config;
@@ -25,16 +24,15 @@ pub(super) struct Frame {
 /// Returns the frame from the observer.
 #[inline(always)] // in each period
 pub(super) fn observed(
-    observer: &impl Observer,
-    delay: Delay,
+    config: &Config,
     foc: &mut State,
     shared: &mut Shared,
     sample: &Sample,
     stator: AlphaBeta<Current>,
 ) -> Frame {
     let loops = &mut foc.loops;
-    let input = input(loops, delay, sample, stator);
-    let estimate = observer.estimate(&mut foc.observer, &input, None);
+    let input = input(loops, config.delay, sample, stator);
+    let estimate = config.observer.estimate(&mut foc.observer, &input, None);
     shared.seen.angle = loops.phase_order.angle(estimate.theta);
     shared.seen.speed = estimate.omega_bar;
     Frame {
@@ -46,17 +44,18 @@ pub(super) fn observed(
 /// Returns the frame that an open-loop start imposes; the observer runs along.
 #[inline(always)] // in each period
 pub(super) fn imposed(
-    observer: &impl Observer,
-    delay: Delay,
+    config: &Config,
     foc: &mut State,
     shared: &mut Shared,
     sample: &Sample,
     stator: AlphaBeta<Current>,
 ) -> Frame {
     let loops = &mut foc.loops;
-    if shared.seen.phase == Phase::Ramp || observer.follows_park() {
-        let input = input(loops, delay, sample, stator);
-        observer.estimate(&mut foc.observer, &input, Some(loops.start.omega_s));
+    if shared.seen.phase == Phase::Ramp || config.observer.follows_park() {
+        let input = input(loops, config.delay, sample, stator);
+        config
+            .observer
+            .estimate(&mut foc.observer, &input, Some(loops.start.omega_s));
     }
     let theta = loops.start.frame;
     shared.seen.angle = loops.phase_order.angle(theta);
@@ -67,11 +66,9 @@ pub(super) fn imposed(
     }
 }
 
-/// Runs the loop from the current in a frame to the duties, with this observer and regulator.
+/// Runs the loop from the current in a frame to the duties.
 #[inline(always)] // in each period
 pub(super) fn current_loop(
-    observer: &impl Observer,
-    regulator: &impl Regulator,
     config: &Config,
     foc: &mut State,
     shared: &mut Shared,
@@ -83,13 +80,14 @@ pub(super) fn current_loop(
     shared.seen.i = i;
 
     // The voltage that drives the current to its reference, as far as the supply allows.
+    let (observer, regulator) = (&config.observer, &config.regulator);
     let fb = observer.feedback(&foc.observer, (frame.omega, i), loops.inductance.factor);
     let demand = regulator.voltage(&loops.regulator, &loops.reference, &fb);
     regulator.integrate(&mut loops.regulator, &loops.reference, &fb);
     let u = if modulator::square_of(demand) <= shared.supply.readable_square {
         modulator::short(demand)
     } else {
-        limited(regulator, loops, shared, demand)
+        limited(config, loops, shared, demand)
     };
     observer.advance(&mut foc.observer, &fb, u);
     shared.seen.u = u;
@@ -114,7 +112,7 @@ pub(super) fn current_loop(
 /// integrators take back what the limit cuts off, and the speed regulator is informed.
 #[cold]
 fn limited(
-    regulator: &impl Regulator,
+    config: &Config,
     loops: &mut Loops,
     shared: &mut Shared,
     demand: Dq<WideVoltage>,
@@ -122,7 +120,7 @@ fn limited(
     shared.applied.expect_unreadable();
     let (u, cut) = modulator::limit(demand, &shared.supply.longest);
     if let Some(cut) = cut {
-        regulator.anti_windup(&mut loops.regulator, cut);
+        config.regulator.anti_windup(&mut loops.regulator, cut);
         loops.i_q_shortfall = loops.reference.i.q.minus(shared.seen.i.q);
     }
     u

@@ -1,8 +1,7 @@
 //! Field-oriented control: open-loop start, flying start, Run, Stopping, and Brake with its observer.
 //!
-//! Each file uses those before it: `state`, `current_loop`, `open_loop`, `outer_loop`, `any`, `begin`, `brake`, `period`.
+//! Each file uses those before it: `state`, `current_loop`, `open_loop`, `outer_loop`, `begin`, `brake`, `period`.
 
-pub(super) mod any;
 pub(super) mod begin;
 pub(super) mod brake;
 pub(super) mod current_loop;

@@ -1,7 +1,6 @@
 //! The open-loop start, Park and Ramp, and mode changes caused by the rotor.
 
 use super::state::State;
-use crate::control::observer::Observer;
 use crate::control::regulator::Reference;
 use crate::control::transform::{AlphaBeta, Dq, rotate_frame};
 use crate::control::{PERIODS, observer, start};

@@ -1,7 +1,6 @@
 //! The pieces of outer-loop work.
 
 use super::state::State;
-use crate::control::observer::Observer;
 use crate::control::regulator::Reference;
 use crate::control::speed::{self, Bounds};
 use crate::control::{PERIODS, dead_time, observer, torque, voltage};

@@ -1,21 +1,16 @@
-//! Selects the current loop's parts: the default observer and regulator compile into dedicated code, the
-//! configuration selects any others at each call.
+//! A period of field-oriented control.
 
-use super::any::any;
 use super::current_loop::{current_loop, imposed, observed};
 use super::state::State;
-use crate::control::delay::Delay;
-use crate::control::observer::{self, compensated};
-use crate::control::regulator::{self, synchronous};
 use crate::control::transform::{AlphaBeta, clarke_in};
+use crate::control::{inductance, observer};
 use crate::drive::config::Config;
 use crate::drive::io::{Bridge, Sample};
 use crate::drive::schedule;
 use crate::drive::shared::Shared;
 use crate::units::{AdcCounts, Current};
 
-/// Runs a period of Park, Ramp, Run or Stopping. The default observer and regulator have dedicated code; all others
-/// share one path.
+/// Runs a period of Park, Ramp, Run or Stopping.
 #[inline(always)] // in each period
 pub(in crate::drive) fn period(
     config: &Config,
@@ -25,31 +20,34 @@ pub(in crate::drive) fn period(
     currents: [AdcCounts; 3],
 ) -> Bridge {
     let stator = clarke_in(foc.loops.phase_order, currents);
-    match (&config.observer, &config.regulator) {
-        (observer::Config::Compensated(observer), regulator::Config::Synchronous(regulator))
-            if config.delay == Delay::One && config.adapt_l.is_none() =>
-        {
-            if schedule::is_start(foc.loops.slot) {
-                return start(observer, regulator, config, foc, shared, sample, stator);
-            }
-            let frame = observed(observer, Delay::One, foc, shared, sample, stator);
-            current_loop(observer, regulator, config, foc, shared, frame, stator)
-        }
-        _ => any(config, foc, shared, sample, stator),
+    if schedule::is_start(foc.loops.slot) {
+        return start(config, foc, shared, sample, stator);
     }
+    adapt(config, foc, shared);
+    let frame = observed(config, foc, shared, sample, stator);
+    current_loop(config, foc, shared, frame, stator)
 }
 
-/// Runs a period of an open-loop start with the default parts.
+/// Runs a period of an open-loop start.
 #[inline(never)] // only a start
 fn start(
-    observer: &compensated::Config,
-    regulator: &synchronous::Config,
     config: &Config,
     foc: &mut State,
     shared: &mut Shared,
     sample: &Sample,
     stator: AlphaBeta<Current>,
 ) -> Bridge {
-    let frame = imposed(observer, Delay::One, foc, shared, sample, stator);
-    current_loop(observer, regulator, config, foc, shared, frame, stator)
+    let frame = imposed(config, foc, shared, sample, stator);
+    current_loop(config, foc, shared, frame, stator)
+}
+
+/// Runs the inductance adaptation, if configured: i_d* carries its wave.
+#[inline(always)] // in each period
+fn adapt(config: &Config, foc: &mut State, shared: &Shared) {
+    if let Some(adapt) = &config.adapt_l {
+        let flux = observer::flux(&config.observer, &foc.observer);
+        let i_d = shared.seen.i.d;
+        let wave = inductance::step(adapt, &mut foc.loops.inductance, i_d, flux);
+        foc.loops.reference.i.d = foc.loops.i_d_reference + wave;
+    }
 }

@@ -2,14 +2,9 @@
 
 use super::*;
 use crate::control::observer::sector::Sector;
-use crate::control::transform::clarke_in;
 use crate::drive::config::QUICK_ATTEMPTS;
-use crate::drive::foc::any::any;
 use crate::drive::foc::begin::PREPARATION_PERIODS;
-use crate::drive::foc::period::period;
-use crate::drive::foc::state::State as Foc;
 use crate::drive::schedule::CYCLE;
-use crate::drive::shared::Shared;
 use crate::units::Angle;
 use fixed::types::I1F31;
 
@@ -376,45 +371,4 @@ fn what_flows_as_the_bridge_is_turned_off_is_no_offset() {
     bench.run(2, sample([13.5, 0.0, -13.5], 24.0), turn);
     bench.until(Phase::Charge, turn);
     assert_eq!(bench.state.shared.zeros.offsets, [AdcCounts::ZERO; 3]);
-}
-
-/// A period of field-oriented control.
-type Period = fn(&Config, &mut Foc, &mut Shared, &Sample, [AdcCounts; 3]) -> Bridge;
-
-/// With a moving supply, and currents of no real rotor, so that every start fails.
-#[test]
-fn the_default_loop_does_what_the_one_of_any_observer_and_regulator_does() {
-    let mut bench = Bench::new(&[]);
-    let turn = bench.turn();
-    let mut driven = 0;
-    for k in 0..20_000 {
-        let bus_v = 24.0 + 0.5 * (f64::from(k) * 0.01).sin();
-        let angle = f64::from(k) * 0.02;
-        let current = |shift: f64| 2.0 * (angle - shift * TAU / 3.0).sin();
-        let flowing = sample([current(0.0), current(1.0), current(2.0)], bus_v);
-        let phase = bench.phase();
-        if phase.drives() {
-            let with = |period: Period| {
-                let mut state = bench.state.clone();
-                let State { foc, shared, .. } = &mut state;
-                let bridge = period(&bench.config, foc, shared, &flowing, flowing.currents);
-                (bridge, state)
-            };
-            assert_eq!(
-                with(period),
-                with(|config, foc, shared, sample, currents| {
-                    let stator = clarke_in(foc.loops.phase_order, currents);
-                    any(config, foc, shared, sample, stator)
-                }),
-                "{k}: {phase:?}"
-            );
-            driven += 1;
-        }
-        let sample = match phase {
-            Phase::Idle | Phase::Sense => sample([0.0; 3], bus_v),
-            _ => flowing,
-        };
-        bench.run(1, sample, turn);
-    }
-    assert!(driven > 5_000, "{driven}");
 }
