@@ -11,6 +11,7 @@
 //! [`identify`]: crate::identify
 //! [`record`]: crate::record
 //! [`tune`]: crate::tune
+//! [`parts`]: crate::parts
 //! [`params`]: crate::params
 //! [`store`]: crate::store
 //! [`mavlink`]: crate::mavlink
@@ -19,8 +20,8 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Module order
-//! Dependencies run one way: {`trace`, `tune`, `checksum`, `image`} ← `math` ← {`units`, `input`} ← `control` ←
-//! `protection` ← `drive` ← {`params`, `statistics`} ← {`check`, `identify`, `record`, `setpoint`, `telemetry`}
+//! Dependencies run one way: `parts` ← {`trace`, `tune`, `checksum`, `image`} ← `math` ← {`units`, `input`} ← `control`
+//! ← `protection` ← `drive` ← {`params`, `statistics`} ← {`check`, `identify`, `record`, `setpoint`, `telemetry`}
 //! ← {`answer`, `mavlink`} ← {`throttle`, `store`} ← `esc`. Modules in the same braces do not use each other. A
 //! test enforces this order, and that every folder has a place in it.
 //!

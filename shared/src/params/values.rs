@@ -82,10 +82,11 @@ impl Params {
         self.choice::<C>().number() == choice.number()
     }
 
-    /// Returns the first parameter whose choice this build lacks: another image has stored it, and it is kept.
+    /// Returns the first parameter whose choice, not the factory's, this build lacks: another image has stored it, and
+    /// it is kept.
     pub fn lacking(&self) -> Option<ParamId> {
         let mut all = ParamId::ALL.into_iter();
-        all.find(|id| id.lacks(self.get(*id)))
+        all.find(|id| id.lacks(self.get(*id)) && !self.is_default(*id))
     }
 
     /// Returns a small whole number. Never inlined: the conversion would be repeated at every choice.
