@@ -4,7 +4,7 @@ use crate::drive::Setpoint;
 use crate::drive::config::tone;
 use crate::input::authority::Command;
 use crate::input::{Share, reverse};
-use crate::math::{Real, TopProduct};
+use crate::math::{Held, Real, TopProduct};
 use crate::params::choice::CtlMode;
 use crate::params::{self, FromMotor, ParamId, Params};
 use crate::tune::Note;
@@ -69,7 +69,7 @@ impl Mapping {
             (Command::Throttle(throttle), Mode::Speed { least, span }) => {
                 let (share, reversed) = split(throttle);
                 let above = share.top(span).scaled();
-                let speed = least.saturating_add(above);
+                let speed = least.plus(above);
                 Setpoint::Speed(if reversed { -speed } else { speed })
             }
             (Command::Throttle(throttle), Mode::Torque { full }) => {

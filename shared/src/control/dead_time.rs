@@ -35,8 +35,8 @@ pub type Certainty = Dq<FixedI32<U25>>;
 /// is smaller than the proportional zone around zero, where the ripple crosses zero within a period. Called
 /// every few periods; `delay_rotation` is the frame's rotation until the voltage acts.
 pub fn certainty(config: &Config, reference: Dq<Current>, delay_rotation: SinCos) -> Certainty {
-    let d = config.certainty.saturating_apply(reference.d).to_bits();
-    let q = config.certainty.saturating_apply(reference.q).to_bits();
+    let d = config.certainty.held(reference.d).to_bits();
+    let q = config.certainty.held(reference.q).to_bits();
     // Shifts less where the result would exceed its type, ±32; beyond that the proportional zone widens in
     // proportion.
     let room = (magnitude(d) | magnitude(q)).leading_zeros() - 1;

@@ -42,7 +42,7 @@ impl Factor {
     /// Returns the product with `x`, saturating.
     #[inline(always)] // in each period
     pub fn of<T: Number>(self, x: T) -> T {
-        Gain::from_parts(self.0.to_bits(), 2).saturating_apply(x)
+        Gain::from_parts(self.0.to_bits(), 2).held(x)
     }
 }
 
@@ -173,7 +173,7 @@ fn edge(config: &Config, state: &mut State) {
         let slope = divide(flux, di_d.unsigned_abs()).min(i32::MAX as u64) as i32;
         let falls = dflux.is_negative() != di_d.is_negative();
         let slope = Flux::from_bits(if falls { -slope } else { slope });
-        let step = config.gain.saturating_apply(slope);
+        let step = config.gain.held(slope);
         let step = step.min(STEP_MAX).max(-STEP_MAX);
         state.factor = Factor::new(state.factor.get() + step);
     }

@@ -96,13 +96,13 @@ impl Config {
 
     fn i_d_at(&self, speed: Speed) -> Current {
         self.i_d
-            .minus(self.i_d_slope.saturating_apply(speed))
+            .minus(self.i_d_slope.held(speed))
             .max(Current::ZERO)
             .min(self.i_d)
     }
 
     fn i_q_at(&self, speed: Speed) -> Current {
-        self.i_q.max(self.i_q_slope.saturating_apply(speed))
+        self.i_q.max(self.i_q_slope.held(speed))
     }
 }
 

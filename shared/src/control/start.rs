@@ -125,8 +125,8 @@ pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage
     let omega = omega_s.plus(state.yield_speed);
     let h_d = config
         .resistance
-        .saturating_apply(i.d)
-        .minus(config.reactance.saturating_apply(omega.top(i.q)))
+        .held(i.d)
+        .minus(config.reactance.held(omega.top(i.q)))
         .minus(u.d);
     // ξ·h_d has 28 fraction bits, a speed 32.
     let rotor_speed = config
@@ -146,7 +146,7 @@ pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage
     }
     let target = config
         .yielding
-        .saturating_apply(omega_s.minus(rotor_speed))
+        .held(omega_s.minus(rotor_speed))
         .min(YIELD_ANGLE_MAX)
         .max(-YIELD_ANGLE_MAX);
     state.yield_speed = config.yield_rate.apply(target.minus(state.yield_angle));

@@ -8,6 +8,7 @@ use super::transitions::Why;
 use crate::control::delay::Delay;
 use crate::control::modulator::Supply;
 use crate::control::sensing::{self, Shunts};
+use crate::math::Held;
 use crate::protection::{self, Fault, Faults};
 use crate::trace::traced;
 use crate::units::{AdcCounts, Duty, Speed, Voltage};
@@ -191,7 +192,7 @@ impl Shared {
     pub(super) fn coast(&mut self, config: &Config) {
         let speed = &mut self.seen.speed;
         let lost = config.coast.apply(*speed) + Speed::DELTA;
-        *speed = speed.saturating_sub(lost).max(Speed::ZERO);
+        *speed = speed.minus(lost).max(Speed::ZERO);
     }
 }
 

@@ -63,27 +63,20 @@ impl<A: Number, B: Number> Gain<A, B> {
     /// Returns the product with `x`.
     ///
     /// The result wraps if it exceeds its type: the caller bounds `x`, or uses
-    /// [`Gain::saturating_apply`].
+    /// [`Gain::held`].
     #[inline(always)] // in each period
     pub fn apply(self, x: A) -> B {
         B::from_bits(self.factor.wrapping(x.to_bits()))
     }
 
-    /// Calls [`Gain::saturating_apply`] out of line, which takes half the flash: for code off the
-    /// default drive's hot path.
-    #[inline(always)]
+    /// Returns the product with `x`, saturated.
+    #[inline(always)] // no more than a call
     pub fn held(self, x: A) -> B {
         B::from_bits(held(self.factor, x.to_bits()))
     }
-
-    /// Returns the product with `x`, saturated.
-    #[inline(always)] // in each period
-    pub fn saturating_apply(self, x: A) -> B {
-        B::from_bits(self.factor.saturating(x.to_bits()))
-    }
 }
 
-/// Shared by all types.
+/// Shared by all types, and never inlined: half the flash.
 #[inline(never)]
 fn held(factor: Factor, x: i32) -> i32 {
     factor.saturating(x)
@@ -179,7 +172,7 @@ mod tests {
     #[test]
     fn saturation_holds_the_ends() {
         let gain = Gain::<I4F28, I4F28>::new(100.0).expect("in range");
-        assert!(gain.saturating_apply(I4F28::from_num(1)) > I4F28::from_num(7.9));
-        assert!(gain.saturating_apply(I4F28::from_num(-1)) < I4F28::from_num(-7.9));
+        assert!(gain.held(I4F28::from_num(1)) > I4F28::from_num(7.9));
+        assert!(gain.held(I4F28::from_num(-1)) < I4F28::from_num(-7.9));
     }
 }

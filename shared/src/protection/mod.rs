@@ -156,7 +156,7 @@ pub fn burning_i_d(config: &Config, state: &State, i_d: Current) -> Current {
 #[inline(never)] // rare, so not part of the longest period
 fn burning_current(config: &Config, state: &State) -> Current {
     let above = state.bus.minus(config.bus_return_v);
-    config.burn_slope.saturating_apply(above)
+    config.burn_slope.held(above)
 }
 
 /// Moves the bounds of i_q, every `periods` periods, so that the supply delivers at most `bus_draw` and sinks at
@@ -211,7 +211,7 @@ fn may_return(config: &Config, state: &State) -> Current {
     let ahead = state.bus.plus(state.rise.saturating_mul_int(AHEAD_PERIODS));
     let above = ahead.minus(config.bus_return_v);
     if above.is_positive() {
-        let less = config.bus_return_slope.saturating_apply(above);
+        let less = config.bus_return_slope.held(above);
         config.bus_return.minus(less)
     } else {
         config.bus_return

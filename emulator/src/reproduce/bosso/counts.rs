@@ -130,7 +130,7 @@ mod tests {
     const PRODUCTS: &[(&str, i32)] = &[
         (".top(", 1),
         (".apply(", 1),
-        (".saturating_apply(", 1),
+        (".held(", 1),
         (".held(", 1),
         // The inductance's factor.
         (".of(", 1),

@@ -3,7 +3,7 @@
 use fixed::types::{I0F32, I16F16, I17F15, I20F12};
 
 use super::{Config, LOOK_SHIFT, SUM_FRACTION, Stage, State};
-use crate::math::TopProduct;
+use crate::math::{Held, TopProduct};
 use crate::units::{Angle, Speed};
 
 /// Speed of the fastest forgetting, a sixteenth of a turn per period with 32 fraction bits.
@@ -114,14 +114,14 @@ fn correct(state: &mut State) {
         let ahead = quotient(turns, state.weight.to_bits() as u32, 16).wrapping_add(older as i32);
         let since = if state.is_slow() { 7 } else { 4 };
         let ahead = ahead.wrapping_add((omega.to_bits() >> 1).wrapping_mul(since));
-        state.omega = state.omega.saturating_add(omega);
+        state.omega = state.omega.plus(omega);
         state.theta = state.theta.wrapping_add(Angle::from_bits(ahead));
     }
     if state.amplitude_weight >= AMPLITUDE_WEIGHT_MIN {
         // 13 − 12 fraction bits; 16 wanted.
         let weight = state.amplitude_weight.to_bits() as u32;
         let step = quotient(state.difference.by_amplitude.to_bits(), weight, 15);
-        let amplitude = state.amplitude.saturating_add(I16F16::from_bits(step));
+        let amplitude = state.amplitude.plus(I16F16::from_bits(step));
         state.amplitude = amplitude.max(AMPLITUDE[0]).min(AMPLITUDE[1]);
     }
 }

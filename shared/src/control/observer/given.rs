@@ -1,7 +1,7 @@
 //! No observer: an encoder, or a simulation that knows the truth, supplies the rotor's position.
 
 use super::{Estimate, SlowEstimate};
-use crate::math::SinCos;
+use crate::math::{Held, SinCos};
 use crate::trace::traced;
 use crate::units::{Angle, Speed};
 
@@ -22,7 +22,7 @@ impl State {
     /// Sets the rotor's angle and speed at the next sample.
     pub fn place(&mut self, theta: Angle, omega: Speed) {
         self.theta = theta;
-        self.omega_step = omega.saturating_sub(self.omega);
+        self.omega_step = omega.minus(self.omega);
         self.omega = omega;
     }
 

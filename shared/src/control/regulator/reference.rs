@@ -79,7 +79,7 @@ pub(super) fn excess_current(
     cut: Dq<WideVoltage>,
 ) -> Dq<Current> {
     Dq {
-        d: admittance.saturating_apply(narrow(cut.d)),
-        q: admittance.saturating_apply(narrow(cut.q)),
+        d: admittance.held(narrow(cut.d)),
+        q: admittance.held(narrow(cut.q)),
     }
 }

@@ -73,7 +73,7 @@ impl Config {
     ) -> Current {
         let reference = reference.with_i_q(Current::ZERO);
         let without = self.voltage(state, &reference, fb).q;
-        self.admittance.saturating_apply(wide(u_q).minus(without))
+        self.admittance.held(wide(u_q).minus(without))
     }
 
     /// Advances the integrators by one period.
@@ -92,8 +92,8 @@ impl Config {
     /// produced in the first-order loop.
     pub fn anti_windup(&self, state: &mut State, cut: Dq<WideVoltage>) {
         let excess = Dq {
-            d: self.admittance.saturating_apply(cut.d),
-            q: self.admittance.saturating_apply(cut.q),
+            d: self.admittance.held(cut.d),
+            q: self.admittance.held(cut.q),
         };
         let State { sigma, model, .. } = state;
         sigma.d = self.k_i.taken(sigma.d, excess.d);
@@ -105,7 +105,7 @@ impl Config {
     /// Updates ω̂·L, every few periods.
     pub fn schedule_gains(&self, state: &mut State, omega: Speed, inductance: Factor) {
         // The gain's output type has 28 fraction bits, as the multiplier has.
-        let product = inductance.of(self.reactance.saturating_apply(omega));
+        let product = inductance.of(self.reactance.held(omega));
         state.cross = Multiplier::from_bits(product.to_bits());
     }
 

@@ -43,11 +43,11 @@ impl Config {
         let error = omega_r.minus(omega);
         let i_q = state
             .sigma
-            .plus(self.k_p.saturating_apply(error))
+            .plus(self.k_p.held(error))
             .plus(self.propeller(omega_r));
         let bounded = input.bounds.hold(i_q);
         let over = i_q.minus(bounded).plus(input.i_q_shortfall);
-        let step = self.k_i.saturating_apply(error);
+        let step = self.k_i.held(error);
         if over == Current::ZERO || over.is_negative() != step.is_negative() {
             state.sigma = state.sigma.plus(step);
         }
@@ -57,10 +57,7 @@ impl Config {
                 q: bounded,
             },
             i_q_step: Current::ZERO,
-            u_q: self
-                .k_ffv
-                .saturating_apply(omega_r)
-                .minus(self.own.saturating_apply(omega)),
+            u_q: self.k_ffv.held(omega_r).minus(self.own.held(omega)),
         }
     }
 
@@ -73,6 +70,6 @@ impl Config {
     #[inline(always)] // in the longest period
     fn propeller(&self, omega_r: Speed) -> Current {
         let square = omega_r.top(omega_r.saturating_abs());
-        self.k_ffi.saturating_apply(square)
+        self.k_ffi.held(square)
     }
 }

@@ -183,7 +183,7 @@ fn omega_n(changes: &[(ParamId, f32)]) -> [f32; 2] {
         let per_s = TAU / p.t;
         // A fifth of the limit asks for all of it.
         let fifth = p.scale.current_from_a(p.limit_a / 5.0);
-        let following = place.omega_n_per_current.saturating_apply(fifth);
+        let following = place.omega_n_per_current.held(fifth);
         let [following, bound, most] = [following, place.omega_n_following, place.omega_n_max]
             .map(|turns| turns.to_num::<f32>() * per_s);
         near("a fifth", following, bound);
