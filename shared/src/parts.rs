@@ -81,6 +81,8 @@ parts! {
     Sine "sine";
     /// What only a simulated bench has: a rotor whose position is given, and a delay of less than a period.
     Bench "bench";
+    /// What ground stations show beside the parameters: descriptions, units, ranges and choices.
+    Metadata "metadata";
     /// The record of the last faults.
     Record "record";
     /// Resistance and flux that are followed while the motor turns.
@@ -88,7 +90,7 @@ parts! {
 }
 
 /// The parts of an image for flying.
-const FLIGHT: &[Part] = &[Part::Record, Part::Drift];
+const FLIGHT: &[Part] = &[Part::Metadata, Part::Record, Part::Drift];
 
 /// The parts of an image with all of both papers.
 const PAPERS: &[Part] = &[

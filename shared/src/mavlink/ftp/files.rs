@@ -7,6 +7,7 @@ use super::text;
 use super::view::View;
 use crate::checksum::checksum;
 use crate::params::ParamId;
+use crate::parts::Part;
 use crate::record::{self, Record};
 
 static GENERAL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz"));
@@ -51,17 +52,7 @@ pub(super) struct Entry {
     content: Content,
 }
 
-static ENTRIES: [Entry; 9] = [
-    Entry {
-        folder: "",
-        name: "general.json.xz",
-        content: Content::Fixed(GENERAL),
-    },
-    Entry {
-        folder: "",
-        name: "parameter.json.xz",
-        content: Content::Fixed(PARAMETER),
-    },
+static ENTRIES: [Entry; 7] = [
     Entry {
         folder: "",
         name: "@PARAM",
@@ -99,6 +90,20 @@ static ENTRIES: [Entry; 9] = [
     },
 ];
 
+/// The parameters' metadata, and where it is: separate, like the next one.
+static METADATA: [Entry; 2] = [
+    Entry {
+        folder: "",
+        name: "general.json.xz",
+        content: Content::Fixed(GENERAL),
+    },
+    Entry {
+        folder: "",
+        name: "parameter.json.xz",
+        content: Content::Fixed(PARAMETER),
+    },
+];
+
 /// The fault record: separate, so that a program without one has none of it.
 static RECORD: Entry = Entry {
     folder: "@SYS/",
@@ -108,7 +113,13 @@ static RECORD: Entry = Entry {
 
 /// Returns the entries of this program.
 fn entries() -> impl Iterator<Item = &'static Entry> {
-    ENTRIES.iter().chain(record::KEPT.then_some(&RECORD))
+    let metadata: &[Entry] = if Part::Metadata.is_here() {
+        &METADATA
+    } else {
+        &[]
+    };
+    let record = record::KEPT.then_some(&RECORD);
+    metadata.iter().chain(&ENTRIES).chain(record)
 }
 
 /// Returns the fault record, if this program keeps one.

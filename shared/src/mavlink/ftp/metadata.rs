@@ -6,6 +6,7 @@ use mavlink::dialects::ardupilotmega::COMPONENT_METADATA_DATA;
 use super::files::GENERAL_CHECKSUM;
 use super::sink::Sink;
 use crate::math::quotient;
+use crate::parts::Part;
 
 /// COMPONENT_INFORMATION, superseded by COMPONENT_METADATA; older ground stations ask for it.
 const COMPONENT_INFORMATION_ID: u32 = 395;
@@ -15,9 +16,9 @@ const GENERAL_URI: &str = "mftp:///general.json.xz";
 /// The URI and the fields before it in the longer message; only zeros follow.
 const PAYLOAD_LEN: usize = 12 + GENERAL_URI.len();
 
-/// Returns true if [`metadata`] makes the message with this id.
+/// Returns true if [`metadata`] makes the message with this id, and this program has metadata.
 pub(in crate::mavlink) const fn is_metadata(id: u32) -> bool {
-    matches!(id, COMPONENT_METADATA_DATA::ID | COMPONENT_INFORMATION_ID)
+    Part::Metadata.is_here() && matches!(id, COMPONENT_METADATA_DATA::ID | COMPONENT_INFORMATION_ID)
 }
 
 /// Returns the payload of one of these messages.
