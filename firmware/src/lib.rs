@@ -53,7 +53,7 @@
 //! | two configurations | the task that owns the parameters, only the one not in use | PWM interrupt |
 //! | three snapshots | PWM interrupt | tasks |
 //! | fault record: `.fault_record`, kept over a reset; only where [`record::KEPT`](siskin_control::record::KEPT) | PWM interrupt; tasks mark it as read | tasks |
-//! | counts of periods and overruns | PWM interrupt | tasks |
+//! | count of periods | PWM interrupt | tasks |
 //! | last snapshot read, its reader | tasks, in a critical section | tasks |
 //! | gate driver's alarm | its interrupt sets it, the PWM interrupt takes it | |
 //! | TIM1 and the injected readings | start-up, then the PWM interrupt; any failure clears the main output enable | |
@@ -77,7 +77,7 @@
 //! | over-current, F405 | the control's own trip, within two periods; the gate driver's limiter is a strap and not relied on | over-current |
 //! | gate supply undervoltage, over-temperature of the driver, F405 | the gate driver; its nFAULT also the timer and the driver's enable | over-current |
 //! | set-point not renewed | `exchange`, which gives the control `Stop` | loss of signal, by the tasks |
-//! | overrun, three in a row or more than one in 100 periods for long | [`last_words`] | after the reset |
+//! | overrun, three in a row or more than one in 100 periods for long | the PWM interrupt, at the end of that period; in flight the motor is caught again | control too slow |
 //! | damage to a stamped image | start-up, which never turns it on | at 115200 baud, and by the light |
 //! | panic, hard fault, stack overflow, interrupt without a handler | [`last_words`], first of all | after the reset |
 //! | processor lockup, G431 | the timer's break | after the watchdog's reset |

@@ -185,7 +185,7 @@ mod tests {
                 },
             );
         }
-        assert_eq!(statistics.faults, [0, 0, 0, 0, 0, 2, 0]);
+        assert_eq!(statistics.faults, [0, 0, 0, 0, 0, 2, 0, 0]);
         let highest = (statistics.temperature_max_c, statistics.phase_max_a);
         assert_eq!(highest, (61.0, 12.5));
     }
@@ -195,7 +195,7 @@ mod tests {
         let statistics = Statistics {
             run_s: 1,
             starts: 2,
-            faults: [3, 4, 5, 6, 7, 8, 9],
+            faults: [3, 4, 5, 6, 7, 8, 9, 10],
             temperature_max_c: 61.5,
             phase_max_a: 12.25,
         };

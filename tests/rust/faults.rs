@@ -449,6 +449,22 @@ fn a_current_sensor_whose_zero_is_far_off_is_a_fault_before_the_bridge_is_on() {
     }
 }
 
+/// The interrupt tells the control of periods that took too long.
+#[test]
+fn a_flight_goes_on_after_control_periods_that_took_too_long() {
+    let mut station = Station::turning();
+    station.heard.clear();
+    let tripped = station.rig.period(Setpoint::Fault(Fault::Overrun));
+    station.periods += 1;
+    assert_eq!(tripped.bridge, Bridge::Off);
+    let pause = station.run(15, HALF);
+    assert!(!pause.on && station.has(Fault::Overrun), "{pause:?}");
+    let after = station.run(2_000, HALF);
+    assert!((after.rpm - 3150.0).abs() < 31.5, "{after:?}");
+    let told = ["Fault: control too slow", "Fault ended: control too slow"];
+    assert_eq!(station.texts(), told);
+}
+
 /// With the bridge off, the open terminals tell the speed, and the throttle catches the turning shaft.
 #[test]
 fn a_coasting_shaft_is_reported_and_caught() {

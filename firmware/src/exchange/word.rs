@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn a_word_that_nobody_writes_is_stop() {
-        assert_eq!(unpack(9), Setpoint::Stop);
+        assert_eq!(unpack(10), Setpoint::Stop);
         assert_eq!(unpack(0), Setpoint::Stop);
     }
 }

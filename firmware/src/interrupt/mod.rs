@@ -31,7 +31,7 @@ mod start;
 mod timing;
 
 #[cfg(board)]
-pub use period::{Interrupt, overruns, periods, record};
+pub use period::{Interrupt, periods, record};
 #[cfg(board)]
 pub use registers::{Registers, Stand};
 #[cfg(board)]

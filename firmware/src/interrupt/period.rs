@@ -1,6 +1,5 @@
 //! One control period.
 
-use core::mem;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
@@ -15,10 +14,12 @@ use super::sample::sample;
 use super::timing::Timing;
 use crate::chip::{self, TIMER_HZ};
 use crate::exchange::RunningEnd;
-use crate::last_words::{Failure, fail};
 
 static PERIODS: AtomicU32 = AtomicU32::new(0);
-static OVERRUNS: AtomicU32 = AtomicU32::new(0);
+
+/// Periods after too many overruns in which the control does nothing, with the bridge off: the tasks have most of the
+/// processor, however long a period of the control takes.
+const RESPITE_PERIODS: u8 = 16;
 
 /// In memory that start-up does not clear. On the G431 it would go in the CCM, close to its writer and clear of
 /// DMA traffic: the SRAM is for the tasks and the stack.
@@ -38,11 +39,6 @@ pub fn record() -> &'static Record {
     &RECORD
 }
 
-/// Returns how many control periods since start-up missed their deadline.
-pub fn overruns() -> u32 {
-    OVERRUNS.load(Ordering::Relaxed)
-}
-
 /// Everything the interrupt owns.
 pub struct Interrupt {
     registers: Registers,
@@ -50,11 +46,14 @@ pub struct Interrupt {
     gate_driver: GateDriver,
     state: State,
     end: RunningEnd,
-    /// The set-point after a hardware trip, which the control handles like a fault that it finds itself.
+    /// A fault that this interrupt has found, for the control in the next period.
+    found: Option<Fault>,
+    /// The set-point of a period with such a fault, or after a hardware trip: the control handles it like a fault that
+    /// it finds itself.
     trip: Setpoint,
     overruns: Overruns,
-    /// The gate driver gave an alarm while the flash was written.
-    alarmed: bool,
+    /// Periods for which the control still does nothing.
+    respite: u8,
 }
 
 impl Interrupt {
@@ -65,10 +64,11 @@ impl Interrupt {
             pwm: end.with_config(|config| Pwm::new(registers.timer, Timing::new(config, TIMER_HZ))),
             gate_driver: GateDriver::new(registers.gate_driver),
             state: end.with_config(State::new),
-            end,
+            found: None,
             trip: Setpoint::Fault(Fault::OverCurrent),
             overruns: Overruns::default(),
-            alarmed: false,
+            respite: 0,
+            end,
         }
     }
 
@@ -95,7 +95,9 @@ impl Interrupt {
     fn hold(&mut self) {
         self.pwm.commutate();
         self.pwm.apply(Bridge::Off);
-        self.alarmed |= !self.gate_driver.ready();
+        if !self.gate_driver.ready() {
+            self.found = Some(Fault::OverCurrent);
+        }
         count(&PERIODS);
     }
 
@@ -105,10 +107,9 @@ impl Interrupt {
         self.pwm.commutate();
         self.end.listen();
         self.adopt();
-        let alarmed = mem::take(&mut self.alarmed);
-        let tripped = self.pwm.broken() || !self.gate_driver.ready() || alarmed;
-        if tripped {
-            self.pwm.clear_break();
+        let tripped = self.pwm.broken() || !self.gate_driver.ready() || self.found.is_some();
+        if tripped && !self.trip() {
+            return;
         }
         // By reference: a set-point built here would be copied through registers, field by field.
         let setpoint = *if tripped {
@@ -131,12 +132,36 @@ impl Interrupt {
         if period.is_multiple_of(PUBLISHED_EVERY) {
             self.publish();
         }
-        if NVIC::is_pending(chip::CONVERTED) {
-            count(&OVERRUNS);
-            if self.overruns.note(period) {
-                fail(Failure::Overrun, [overruns(), 0, 0, 0]);
-            }
+        if NVIC::is_pending(chip::CONVERTED) && self.overruns.note(period) {
+            self.give_up();
         }
+    }
+
+    /// Prepares the set-point of a period with a fault; returns false if the control has a respite. A break that comes with
+    /// another fault waits for its own period.
+    #[cold]
+    #[inline(never)] // only some periods
+    fn trip(&mut self) -> bool {
+        if self.respite > 0 {
+            self.respite -= 1;
+            count(&PERIODS);
+            return false;
+        }
+        let fault = self.found.take().unwrap_or_else(|| {
+            self.pwm.clear_break();
+            Fault::OverCurrent
+        });
+        self.trip = Setpoint::Fault(fault);
+        true
+    }
+
+    /// Every duty comes late: turns the bridge off at once, which the control hears of after its respite.
+    #[cold]
+    #[inline(never)] // only where periods are too long
+    fn give_up(&mut self) {
+        self.pwm.apply(Bridge::Off);
+        self.found = Some(Fault::Overrun);
+        self.respite = RESPITE_PERIODS;
     }
 
     #[inline(never)] // only some periods

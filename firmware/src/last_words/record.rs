@@ -23,8 +23,6 @@ pub enum Failure {
     StackOverflow = 3,
     /// An interrupt without a handler: its number, negative for an exception.
     UnexpectedInterrupt = 4,
-    /// Control periods repeatedly missed their deadline: how many.
-    Overrun = 5,
     /// The control interrupt has not run for 50 ms.
     Standstill = 6,
 }
@@ -100,11 +98,6 @@ impl Record {
                 }
                 push_decimal(&mut text, (first as i32).unsigned_abs());
             }
-            5 => {
-                push(&mut text, "control overran ");
-                push_decimal(&mut text, first);
-                push(&mut text, " periods");
-            }
             6 => push(&mut text, "the control stood still"),
             _ => return None,
         }
@@ -143,8 +136,8 @@ mod tests {
             "Restart: unexpected interrupt -12"
         );
         assert_eq!(
-            text(Failure::Overrun, [3, 0, 0, 0]),
-            "Restart: control overran 3 periods"
+            text(Failure::Standstill, [0; DETAILS]),
+            "Restart: the control stood still"
         );
     }
 

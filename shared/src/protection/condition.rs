@@ -137,7 +137,7 @@ conditions! {
     /// A reason why the bridge was turned off.
     Fault,
     /// A set of faults.
-    Faults of 7 from 0,
+    Faults of 8 from 0,
     /// Its flag in `ESC_FAILURE_FLAGS`; GENERIC if it has none of its own.
     failure_flag: u16;
 
@@ -169,6 +169,10 @@ conditions! {
     CurrentSensor = 6 "current sensor defect" 64,
         "a current sensor's zero is too far off"
         "its shunt and amplifier: `siskin check`";
+    /// Control periods took longer than the PWM's, so that duties came late.
+    Overrun = 7 "control too slow" 64,
+        "three control periods in a row took longer than the PWM's, or for long more than one in 100 did: duties came late"
+        "lower `PWM_FREQ_HZ`";
 }
 
 conditions! {
@@ -222,7 +226,11 @@ impl Fault {
     /// Returns true if it can pass by itself, so that a drive that has proven itself may be retried.
     pub const fn is_retried(self) -> bool {
         match self {
-            Self::OverCurrent | Self::OverVoltage | Self::UnderVoltage | Self::ObserverLost => true,
+            Self::OverCurrent
+            | Self::OverVoltage
+            | Self::UnderVoltage
+            | Self::ObserverLost
+            | Self::Overrun => true,
             Self::OverTemperature | Self::Stuck | Self::CurrentSensor => false,
         }
     }

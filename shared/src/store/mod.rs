@@ -8,7 +8,7 @@
 //! it replaces stay until the new one is written and verified.
 //!
 //! # Wear
-//! A set with twenty changed parameters, the statistics and a key has 43 words, 344 bytes. On the STM32G431 a
+//! A set with twenty changed parameters, the statistics and a key has 44 words, 352 bytes. On the STM32G431 a
 //! half is one 2 KB page, which lasts for 10 000 erases (DS12589) and fits 5 sets: 100 000 saves of statistics,
 //! or 50 000 changes of settings. With up to 40 changed parameters it is at least 40 000 changes, and with
 //! every value changed 20 000. The STM32F405's two 16 KB sectors (10 000 erases, DS8626) last at least eight

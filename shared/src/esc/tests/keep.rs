@@ -267,7 +267,7 @@ fn statistics_are_kept_when_the_motor_has_come_to_rest() {
     assert_eq!(bench.requests, [Request::Keep]);
     let statistics = bench.esc.kept().statistics;
     assert_eq!((statistics.run_s, statistics.starts), (3, 1));
-    assert_eq!(statistics.faults, [0, 0, 1, 0, 0, 0, 0]);
+    assert_eq!(statistics.faults, [0, 0, 1, 0, 0, 0, 0, 0]);
     assert_eq!(statistics.temperature_max_c, 25.0);
     bench.storage_done(Ok(()));
     bench.frames(5_000, 0);

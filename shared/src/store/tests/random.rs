@@ -42,7 +42,8 @@ impl Random {
             1 => {
                 kept.statistics.run_s += 1 + self.word() % 600;
                 kept.statistics.starts += 1;
-                kept.statistics.faults[self.below(7)] += 1;
+                let fault = self.below(kept.statistics.faults.len());
+                kept.statistics.faults[fault] += 1;
                 kept.statistics.temperature_max_c += 0.125;
                 kept.statistics.phase_max_a += 0.5;
             }

@@ -73,7 +73,7 @@ fn statistics_are_told_in_words() {
     bench.telemetry.statistics = Statistics {
         run_s: 3_661,
         starts: 10,
-        faults: [0, 0, 0, u32::MAX, 0, 1, 0],
+        faults: [0, 0, 0, u32::MAX, 0, 1, 0, 0],
         temperature_max_c: 61.6,
         phase_max_a: 0.0,
     };
