@@ -69,6 +69,11 @@ impl Load {
         }
     }
 
+    /// Returns true while the handler runs.
+    pub fn is_in_interrupt(&self) -> bool {
+        self.entered.is_some()
+    }
+
     /// Notes that the handler has ended.
     pub fn left(&mut self, now: Cycles, instructions: u64) {
         if let Some((entered, before)) = self.entered.take() {

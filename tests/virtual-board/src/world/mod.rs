@@ -84,6 +84,8 @@ pub struct World {
     setpoint_at: Option<u32>,
     /// Looks at the start and end of each control period.
     probe: Option<Probe>,
+    /// How many times as long as it should the control interrupt takes.
+    slowness: u64,
 }
 
 /// Called at the start and end of each control period.
@@ -164,6 +166,7 @@ impl World {
             load: Load::default(),
             setpoint_at,
             probe: None,
+            slowness: 1,
         };
         world.forget_memory();
         world.settle();
@@ -232,6 +235,11 @@ impl World {
     /// Gives one of the board's comparators, by number, a defect.
     pub fn set_comparator_defect(&mut self, number: u8, defect: Defect) {
         self.parts.comparators.set_defect(number, defect);
+    }
+
+    /// Makes the control interrupt's code cost this many times as many cycles from now on.
+    pub fn slow_control(&mut self, times: u64) {
+        self.slowness = times;
     }
 
     /// Sets the option bytes.
@@ -443,6 +451,12 @@ impl Surroundings for World {
     }
 
     fn pass(&mut self, cycles: Cycles) {
+        let times = if self.load.is_in_interrupt() {
+            self.slowness
+        } else {
+            1
+        };
+        let cycles = cycles * times;
         let eighths = cycles * self.eighths + self.rest;
         self.rest = eighths % 8;
         let target = self.now + eighths / 8;

@@ -10,6 +10,7 @@
 //! | [`self_test`] | a sound board passes its self-test, and each defect is named |
 //! | [`identify`] | it identifies its motor, by command and by parameter, and keeps the result |
 //! | [`failures`] | panic, fault, standstill, break and lockup turn the bridge off |
+//! | [`overruns`] | periods that take too long turn the bridge off, and a flight goes on after them |
 //! | [`damaged`] | a damaged image never turns the bridge on |
 //! | [`agreement`] | the control's state and the motor agree with the emulator's |
 //!
@@ -27,6 +28,7 @@ mod damaged;
 mod failures;
 mod flight_controller;
 mod identify;
+mod overruns;
 mod readings;
 mod replies;
 mod self_test;

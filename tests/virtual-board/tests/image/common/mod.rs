@@ -11,8 +11,8 @@ use std::env;
 use std::hash::Hash;
 
 use mavlink::dialects::ardupilotmega::{
-    COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd, MavParamType, PARAM_REQUEST_READ_DATA,
-    PARAM_SET_DATA, PARAM_VALUE_DATA, STATUSTEXT_DATA,
+    COMMAND_LONG_DATA, FILE_TRANSFER_PROTOCOL_DATA, HEARTBEAT_DATA, MavCmd, MavParamType,
+    PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA, STATUSTEXT_DATA,
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, MessageData};
 use siskin_control::input::dshot::{Frame as Dshot, check_mask};
@@ -224,6 +224,8 @@ pub(crate) struct Board {
     /// When the next one comes.
     due_ns: u64,
     sequence: u8,
+    /// The number of the last request to its file server.
+    asked: u16,
 }
 
 impl Board {
@@ -243,6 +245,7 @@ impl Board {
             played: 0,
             due_ns: 0,
             sequence: 0,
+            asked: 0,
         }
     }
 
@@ -384,6 +387,57 @@ impl Board {
             target_component: self.heard.from.component,
             ..COMMAND_LONG_DATA::default()
         });
+    }
+
+    /// Reads one of the files that it serves.
+    pub(crate) fn file(&mut self, path: &str) -> Vec<u8> {
+        const OPEN_TO_READ: u8 = 4;
+        const READ: u8 = 5;
+        let (_, opened) = self.ask_server(OPEN_TO_READ, 0, path.as_bytes());
+        assert!(opened, "{path} does not open");
+        let mut file = Vec::new();
+        while let (piece, true) = self.ask_server(READ, file.len() as u32, &[]) {
+            file.extend(piece);
+        }
+        file
+    }
+
+    /// Sends its file server a request about its first session; returns the answer's bytes, and whether it is an
+    /// acknowledgement.
+    fn ask_server(&mut self, opcode: u8, offset: u32, bytes: &[u8]) -> (Vec<u8>, bool) {
+        const HEAD: usize = 12;
+        const MOST: u8 = 239;
+        const ACKNOWLEDGED: u8 = 128;
+        let mut payload = [0; 251];
+        let size = if bytes.is_empty() {
+            MOST
+        } else {
+            bytes.len() as u8
+        };
+        self.asked = self.asked.wrapping_add(2);
+        payload[..2].copy_from_slice(&self.asked.to_le_bytes());
+        (payload[3], payload[4]) = (opcode, size);
+        payload[8..HEAD].copy_from_slice(&offset.to_le_bytes());
+        payload[HEAD..HEAD + bytes.len()].copy_from_slice(bytes);
+        self.heard.frames.clear();
+        self.send(&FILE_TRANSFER_PROTOCOL_DATA {
+            target_network: 0,
+            target_system: self.heard.from.system,
+            target_component: self.heard.from.component,
+            payload,
+        });
+        let mut answer = None;
+        self.run_until(MS, 1_000 * MS, |board| {
+            let answers = board.heard.messages::<FILE_TRANSFER_PROTOCOL_DATA>();
+            answer = answers.into_iter().next().map(|(_, data)| data.payload);
+            answer.is_some()
+        });
+        let answer = answer.expect("an answer of the file server");
+        let size = usize::from(answer[4]);
+        (
+            answer[HEAD..HEAD + size].to_vec(),
+            answer[3] == ACKNOWLEDGED,
+        )
     }
 
     pub(crate) fn register(&mut self, register: Register) -> u32 {
