@@ -39,7 +39,8 @@ BOARDS = {
         # All but the store. The target is 96 KB, next to a resident loader.
         flash=Region("flash", 0x0800_0000, 128 * KB, 124 * KB),
         memories=(
-            Region("CCM", 0x1000_0000, 10 * KB, 9 * KB),
+            # With the fault record, which the image for flying keeps.
+            Region("CCM", 0x1000_0000, 10 * KB, 10 * KB),
             Region("SRAM", 0x2000_0000, 22 * KB, 18 * KB),
         ),
         pwm="ADC1_2",
