@@ -213,7 +213,7 @@ def test_the_tool_tells_a_boards_image(board, tmp_path):
     )
     assert told.returncode == 0, told.stderr
     assert re.search(rf"^board +{board}$", told.stdout, re.MULTILINE)
-    assert re.search(r"^version +\d+\.\d+\.\d+$", told.stdout, re.MULTILINE)
+    assert re.search(r"^version +\d+\.\d+\.\d+( flight)?$", told.stdout, re.MULTILINE)
     assert re.search(r"^build +([0-9a-f]{16}\+?|unknown)$", told.stdout, re.MULTILINE)
     image = Image(elf)
     contents = (tmp_path / f"{board}.bin").read_bytes()
