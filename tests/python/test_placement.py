@@ -36,7 +36,7 @@ OTHERS = {
     ("siskin_firmware", "exchange", "ends", "ConfigWriter", "write"): (".once", 4),
     ("siskin_control", "drive", "foc", "outer_loop", "reference"): (".control", 0x1800),
     ("siskin_control", "math", "root", "leg"): (".control_more", 0x800),
-    ("siskin_control", "drive", "foc", "any", "any"): (".control_rest", 0x5000),
+    ("siskin_control", "drive", "foc", "period", "start"): (".control_rest", 0x5000),
     ("siskin_control", "control", "speed", "Config", "preset"): (".control_rest", 4),
     ("siskin_control", "params", "build", "build"): (".text", 4),
 }
