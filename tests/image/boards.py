@@ -41,7 +41,7 @@ BOARDS = {
         memories=(
             # With the fault record, which the image for flying keeps.
             Region("CCM", 0x1000_0000, 10 * KB, 10 * KB),
-            Region("SRAM", 0x2000_0000, 22 * KB, 18 * KB),
+            Region("SRAM", 0x2000_0000, 22 * KB, 19 * KB),
         ),
         pwm="ADC1_2",
         alarm=None,
