@@ -240,7 +240,7 @@ fn a_dump_has_the_bridge_and_the_throttle_to_the_nanosecond() {
     });
     recorder.finish().unwrap();
     let wires = wires(&path);
-    assert_eq!(wires.len(), 6 + 1 + 3 + 9 + 7, "{:?}", wires.keys());
+    assert_eq!(wires.len(), 6 + 1 + 3 + 9 + 8, "{:?}", wires.keys());
     assert_eq!(wires["signal"], sent);
 
     let dead_ns = 500;

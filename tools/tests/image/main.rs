@@ -83,7 +83,7 @@ fn an_image_for_a_board_is_built_first() {
         bench.asked(),
         [
             "cargo build --package siskin-firmware --release --target thumbv7em-none-eabihf \
-             --features b-g431b-esc1 --message-format=json-render-diagnostics"
+             --features b-g431b-esc1 --message-format=json"
         ]
     );
 
