@@ -131,7 +131,6 @@ mod tests {
         (".top(", 1),
         (".apply(", 1),
         (".held(", 1),
-        (".held(", 1),
         // The inductance's factor.
         (".of(", 1),
         (".plus_top(", 1),

@@ -16,7 +16,7 @@ pub(crate) fn made(board: &str, extension: &str) -> PathBuf {
     images.join(board).with_extension(extension)
 }
 
-/// Panics with the command that makes a board's image if there is none.
+/// Panics with the command that makes a board's image, by the board and its options, if there is none.
 pub(crate) fn is_made(board: &str, path: &Path) {
     assert!(
         path.is_file(),

@@ -54,6 +54,15 @@ pub(crate) fn image() -> Image {
     Image::read(&path).unwrap_or_else(|error| panic!("{error}"))
 }
 
+/// Returns the image with all of the papers, which does not follow R and flux: the configuration stays the one that
+/// the parameters make.
+pub(crate) fn papers() -> Image {
+    const NAME: &str = "b-g431b-esc1-papers";
+    let path = made(NAME, "elf");
+    is_made("b-g431b-esc1 --parts papers", &path);
+    Image::read(&path).unwrap_or_else(|error| panic!("{error}"))
+}
+
 /// What the flight controller sends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Throttle {
