@@ -23,7 +23,8 @@ pub const FLASH_BYTES: usize = 2 * PAGE_BYTES;
 /// Bytes of a double word, which is written as a whole.
 pub const WORD_BYTES: usize = 8;
 
-const ERASED: u8 = 0xFF;
+/// What an erased byte holds.
+pub const ERASED: u8 = 0xFF;
 
 /// Flash backed by a file, which nobody else may read: it holds a signing key. Writes and erases are in the file when
 /// the call returns, so they survive a kill of the program, and after [`FileFlash::sync`] a loss of power.

@@ -9,7 +9,7 @@ use siskin_control::params::Params;
 use siskin_control::store;
 use siskin_emulator::device::Start;
 use siskin_emulator::fault::{Fault, Timeline};
-use siskin_emulator::flash::{FLASH_BYTES, FileFlash, PAGE_BYTES};
+use siskin_emulator::flash::{ERASED, FLASH_BYTES, FileFlash, FlashError, PAGE_BYTES, WORD_BYTES};
 use siskin_emulator::link::LinkId;
 use siskin_emulator::machine::{Machine, Onlooker, Stopped};
 use siskin_emulator::summary::Rejected;
@@ -49,6 +49,8 @@ pub struct VirtualBoard {
     starved: bool,
     wire: Wire,
     flash: FileFlash,
+    /// What the chip's store held at the start and the file does not, until the chip stores.
+    unwritten: Option<Vec<u8>>,
     mavlink: Mavlink,
     telemetry: Telemetry,
 }
@@ -76,6 +78,7 @@ impl VirtualBoard {
         let loaded = store::load(&mut flash, ALL);
         let warning = loaded.trouble();
         let mut stored = bytes(&mut flash);
+        let mut unwritten = None;
         let mut kept = loaded.kept;
         let mut given = defaults;
         given.retain(|(id, _)| kept.params.is_default(*id));
@@ -85,10 +88,13 @@ impl VirtualBoard {
                 // It was checked when it was given.
                 let _ = kept.params.set(id, value);
             }
+            // Behind what is stored, where the chip's own changes follow.
             let mut other = FileFlash::in_memory();
+            replace(&mut other, &stored).map_err(|error| Stopped(format!("--storage: {error}")))?;
             obey(Request::Save, &mut other, ALL, &mut kept)
                 .map_err(|reason| Stopped(format!("the parameters cannot be stored: {reason}")))?;
             stored = bytes(&mut other);
+            unwritten = Some(stored.clone());
         }
 
         let code = Memory::new(CODE.start, CODE.len(), 0xff);
@@ -129,6 +135,7 @@ impl VirtualBoard {
             starved: false,
             wire,
             flash,
+            unwritten,
             mavlink: Mavlink::default(),
             telemetry: Telemetry::default(),
         };
@@ -256,6 +263,9 @@ impl VirtualBoard {
         let changes = self.processor.surroundings().parts().flash.take_changes();
         let failed = |error: &dyn std::fmt::Display| Stopped(format!("--storage: {error}"));
         let changed = !changes.is_empty();
+        if changed && let Some(stored) = self.unwritten.take() {
+            replace(&mut self.flash, &stored).map_err(|error| failed(&error))?;
+        }
         for change in changes {
             let written = match change {
                 Change::Erased { offset } => self.flash.erase(offset, offset + PAGE_BYTES as u32),
@@ -337,6 +347,27 @@ impl Machine for VirtualBoard {
             lockstep_requests: None,
         }
     }
+}
+
+/// Makes the file hold these bytes. Erases only pages with words that change their content.
+fn replace(flash: &mut FileFlash, wanted: &[u8]) -> Result<(), FlashError> {
+    let held = bytes(flash);
+    let pages = held.chunks(PAGE_BYTES).zip(wanted.chunks(PAGE_BYTES));
+    for (page, (held, wanted)) in pages.enumerate() {
+        let page = (page * PAGE_BYTES) as u32;
+        let words = || held.chunks(WORD_BYTES).zip(wanted.chunks(WORD_BYTES));
+        let is_erased = |word: &[u8]| word.iter().all(|byte| *byte == ERASED);
+        let erases = words().any(|(held, wanted)| held != wanted && !is_erased(held));
+        if erases {
+            flash.erase(page, page + PAGE_BYTES as u32)?;
+        }
+        for (number, (held, wanted)) in words().enumerate() {
+            if !is_erased(wanted) && (erases || held != wanted) {
+                flash.write(page + (number * WORD_BYTES) as u32, wanted)?;
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Returns all bytes of the file.
