@@ -14,7 +14,6 @@ LINK = ROOT / "firmware" / "link"
 REQUIRED = {
     ("siskin_firmware", "interrupt", "pwm", "Pwm", "change"): ".control",
     ("siskin_firmware", "interrupt", "period", "Interrupt", "hold"): ".control",
-    ("siskin_control", "drive", "step", "step"): ".control",
     ("siskin_control", "drive", "step", "outer_loop_slice"): ".control",
     ("siskin_control", "drive", "foc", "outer_loop", "supply"): ".control",
     ("siskin_control", "control", "modulator", "Supply", "update_limits"): ".control",

@@ -17,7 +17,7 @@ use crate::units::AdcCounts;
 ///
 /// Pure: no clock, no allocation, no logging, and no effect beyond the state and the returned value. Called once
 /// per PWM period, by the chip's interrupt and the emulator's loop.
-#[inline(never)] // only some periods
+#[inline(always)] // in each period: sample, set-point and result would go through memory
 pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoint) -> Bridge {
     // Decide the mode from what the last period saw. While field-oriented control drives, only its schedule does
     // so: once per cycle, and in a start also where its own pieces are due. This precedes reading the sample, so

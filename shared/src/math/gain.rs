@@ -70,16 +70,10 @@ impl<A: Number, B: Number> Gain<A, B> {
     }
 
     /// Returns the product with `x`, saturated.
-    #[inline(always)] // no more than a call
+    #[inline(always)] // in the longest period: a call takes longer
     pub fn held(self, x: A) -> B {
-        B::from_bits(held(self.factor, x.to_bits()))
+        B::from_bits(self.factor.saturating(x.to_bits()))
     }
-}
-
-/// Shared by all types, and never inlined: half the flash.
-#[inline(never)]
-fn held(factor: Factor, x: i32) -> i32 {
-    factor.saturating(x)
 }
 
 /// Mantissa bits of a float, including the implicit one.

@@ -26,7 +26,7 @@ fn panic_entry(image: &Image) -> u32 {
 
 /// Returns where the control period begins: it pushes nine registers.
 fn step_entry(image: &Image) -> u32 {
-    let symbol = image.symbol(&["5drive4step4step"]);
+    let symbol = image.symbol(&["9interrupt6period", "9Interrupt7control"]);
     let (address, _) = symbol.expect("the image has a control period");
     address & !1
 }
