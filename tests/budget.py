@@ -30,6 +30,13 @@ MEASURED = [
         [("median", "at most 460"), ("maximum", "at most 840")],
     ),
     (
+        "PWM interrupt, in steady flight",
+        "instructions",
+        "counts",
+        r"^(?:.* )?the whole interrupt:(?:.*\n)*?steady flight +\d+ +\d+ +\d+ +(\d+)$",
+        [("maximum", "at most 700")],
+    ),
+    (
         "PWM interrupt, on the virtual board",
         "estimated cycles",
         "virtual-board",

@@ -8,8 +8,6 @@ mod count;
 mod program;
 mod words;
 
-use core::hint::black_box;
-
 use cortex_m_rt::entry;
 use semihosting::io;
 use siskin_firmware::exchange;
@@ -61,5 +59,5 @@ fn replay(counter: &Counter) -> io::Result<()> {
 /// restore registers, are not instructions.
 #[inline(never)]
 fn period(interrupt: &mut Interrupt) {
-    black_box(interrupt).run();
+    interrupt.run();
 }

@@ -1,5 +1,7 @@
 //! A run on the emulator's bench, and what the chip must answer to it.
 
+use std::mem::{Discriminant, discriminant};
+
 use fixed::types::I1F31;
 use siskin_control::drive::{Config, Phase, Sample, Setpoint, State, step};
 use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
@@ -8,8 +10,9 @@ use siskin_emulator::fault::InForce;
 use siskin_emulator::rig::{Bench, Rig};
 use siskin_on_target::{answer, request};
 
-/// The interrupt publishes a snapshot once in this many periods, beginning with the first.
-const PUBLISHED_EVERY: usize = 8;
+/// The interrupt publishes its first snapshot in the first period, and each further one before the last is older than
+/// this, in periods: a millisecond.
+const OLDEST: usize = 24;
 
 /// What the drive is asked for, or suffers.
 #[derive(Clone, Copy, Debug)]
@@ -58,6 +61,8 @@ pub(crate) struct Label {
     pub(crate) phase: Phase,
     /// Whether a fault held the bridge off.
     pub(crate) latched: bool,
+    /// The kind of set-point.
+    kind: Discriminant<Setpoint>,
 }
 
 /// A recorded run.
@@ -71,8 +76,9 @@ pub(crate) struct Run {
 }
 
 impl Run {
-    /// Records the acts, each for its number of seconds, on the default bench with its realistic sensing.
-    pub(crate) fn record(changes: &[(ParamId, f32)], acts: &[(f64, Act)]) -> Self {
+    /// Records the acts, each for its number of seconds, on the default bench with its realistic sensing. Each is
+    /// `longer` by a few periods.
+    pub(crate) fn record(changes: &[(ParamId, f32)], acts: &[(f64, Act)], longer: u32) -> Self {
         let mut params = Params::of(&BOSSO_BENCH);
         for (id, value) in changes {
             params.set(*id, *value).expect("in range");
@@ -94,7 +100,7 @@ impl Run {
             let now = act.wrong();
             rig.disturb(&before, &now);
             before = now;
-            for _ in 0..(time_s / rig.period_s()) as u32 {
+            for _ in 0..(time_s / rig.period_s()) as u32 + longer {
                 let period = rig.period(exchanged(act.setpoint(&config)));
                 run.take(&config, &mut state, &period.sample, period.setpoint);
             }
@@ -109,6 +115,7 @@ impl Run {
         self.labels.push(Label {
             phase: snapshot.phase,
             latched: !snapshot.faults.is_empty(),
+            kind: discriminant(&setpoint),
         });
         self.results.push(answer::result(config, state, bridge));
         self.snapshots.push(answer::snapshot(&snapshot));
@@ -132,9 +139,14 @@ impl Run {
         let (periods, rest) = words.as_chunks::<{ answer::INTERRUPT_WORDS }>();
         assert!(rest.is_empty() && periods.len() == self.snapshots.len());
         let mut instructions = Vec::with_capacity(periods.len());
+        let mut published = 0;
         for (n, [snapshot, count]) in periods.iter().enumerate() {
-            let expected = self.snapshots[n - n % PUBLISHED_EVERY];
+            if *snapshot == self.snapshots[n] {
+                published = n;
+            }
+            let expected = self.snapshots[published];
             assert_eq!(*snapshot, expected, "period {n}, {:?}", self.labels[n]);
+            assert!(n - published < OLDEST, "period {n} of {published}");
             instructions.push(*count);
         }
         instructions
