@@ -11,6 +11,11 @@ mod gate_driver;
 mod overruns;
 #[cfg(board)]
 mod period;
+#[cfg_attr(
+    not(any(board, test)),
+    expect(dead_code, reason = "for the boards; tested on the host")
+)]
+mod publication;
 #[cfg(board)]
 mod pwm;
 #[cfg(board)]

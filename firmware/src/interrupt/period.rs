@@ -8,6 +8,7 @@ use siskin_control::record::{self, Record};
 
 use super::gate_driver::GateDriver;
 use super::overruns::Overruns;
+use super::publication::Publication;
 use super::pwm::Pwm;
 use super::registers::Registers;
 use super::sample::sample;
@@ -25,9 +26,6 @@ const RESPITE_PERIODS: u8 = 16;
 /// DMA traffic: the SRAM is for the tasks and the stack.
 #[unsafe(link_section = ".fault_record")]
 static RECORD: Record = Record::new();
-
-/// Periods per snapshot for the tasks: they look once a millisecond, which is 8 periods at the slowest PWM.
-const PUBLISHED_EVERY: u32 = 8;
 
 /// Returns the control periods since start-up, wrapping; while it counts, the interrupt is alive.
 pub fn periods() -> u32 {
@@ -54,6 +52,7 @@ pub struct Interrupt {
     overruns: Overruns,
     /// Periods for which the control still does nothing.
     respite: u8,
+    publication: Publication,
 }
 
 impl Interrupt {
@@ -68,6 +67,7 @@ impl Interrupt {
             trip: Setpoint::Fault(Fault::OverCurrent),
             overruns: Overruns::default(),
             respite: 0,
+            publication: end.with_config(|config| Publication::new(config.scale.period_s)),
             end,
         }
     }
@@ -119,6 +119,7 @@ impl Interrupt {
         };
         let sample = sample(&self.registers);
         let state = &mut self.state;
+        let phase = state.phase();
         let bridge = self
             .end
             .with_config(|config| step(config, state, sample, setpoint));
@@ -129,7 +130,11 @@ impl Interrupt {
             self.end
                 .with_config(|config| RECORD.note(config, state, (&sample, &bridge), period));
         }
-        if period.is_multiple_of(PUBLISHED_EVERY) {
+        let Self { state, pwm, .. } = self;
+        if self
+            .publication
+            .is_now(|| state.has_done_little(phase) && !pwm.is_deferred())
+        {
             self.publish();
         }
         if NVIC::is_pending(chip::CONVERTED) && self.overruns.note(period) {

@@ -105,6 +105,11 @@ impl Pwm {
         }
     }
 
+    /// Returns true if the last command needs another commutation: it took long.
+    pub(crate) fn is_deferred(&self) -> bool {
+        self.deferred.is_some()
+    }
+
     #[cold]
     fn second(&mut self) {
         if let Some(legs) = self.deferred.take() {
@@ -133,13 +138,13 @@ impl Pwm {
     /// afterwards all switches stay off until the top.
     #[inline(always)] // in each period
     pub(crate) fn apply(&mut self, bridge: Bridge) {
+        // Most periods first: a `match` over all kinds looks their place up in a table.
+        if let (Bridge::Duty([a, b, c]), LowSides::Switching) = (bridge, self.low_sides) {
+            let top = self.top;
+            // The main output has been on since the previous period, or a break has turned it off.
+            return self.set_compares([compare(a, top), compare(b, top), compare(c, top)]);
+        }
         match (bridge, self.low_sides) {
-            (Bridge::Duty(duties), LowSides::Switching) => {
-                let [a, b, c] = duties;
-                let top = self.top;
-                // The main output has been on since the previous period, or a break has turned it off.
-                self.set_compares([compare(a, top), compare(b, top), compare(c, top)]);
-            }
             (Bridge::Brake, LowSides::Switching) => self.set_compares([0; 3]),
             (Bridge::Off, LowSides::None) => turn_off(self.timer),
             (Bridge::Charge(share), LowSides::Alone) => {
@@ -179,12 +184,12 @@ impl Pwm {
         self.turn_on();
     }
 
+    /// Turns all switches off at once by the main output; the modes follow in the next commutation, since a drive that
+    /// ends has had a long period.
     fn off(&mut self) {
         turn_off(self.timer);
         self.low_sides = LowSides::None;
-        self.deferred = None;
-        self.set_modes([Leg::Off; 3]);
-        self.commutate();
+        self.deferred = Some([Leg::Off; 3]);
     }
 
     fn turn_on(&mut self) {

@@ -57,6 +57,11 @@ impl State {
         self.catch.is_compare_due()
     }
 
+    /// Returns true if this period only checks a tracked rotor's fit.
+    pub(super) fn does_little(&self) -> bool {
+        self.catch.is_check_due()
+    }
+
     /// Forgets the rotor: the terminals have been driven since.
     pub(super) fn forget(&mut self) {
         self.rotor = Rotor::Unknown;

@@ -1,9 +1,9 @@
-//! Outer-loop work, time-sliced over 32 periods; 21 of Run's 32 have none.
+//! Outer-loop work, time-sliced over 32 periods; 19 of Run's 32 have none.
 //!
 //! Every 8 periods the reference is computed (3 kHz at 24 kHz PWM, for a bandwidth of tens of hertz), and two
 //! periods later the dead-time signs. Every 16 come the supply and the bounds of i_q; every 32 the observer's
-//! gains, delay compensation, decoupling and mode changes. Every eighth period also publishes a snapshot, anywhere
-//! in the cycle, so that more than half of all interrupts stay short.
+//! gains, delay compensation, decoupling and mode changes. The firmware publishes its snapshots in periods with little
+//! work, so that those with much stay as short as they are.
 //!
 //! A tone and Brake have cycles of their own, in `tone.rs` and `foc/brake.rs`.
 
@@ -108,7 +108,7 @@ const RUN: &[Row] = &[
     (Work::SUPPLY_BOUNDS, 2, SUPPLY_PERIODS),
     (Work::TRIP_LEVEL, 6, CYCLE),
     (Work::LONGEST_VECTOR, 4, SUPPLY_PERIODS),
-    (Work::SPEED_BOUNDS, 4, SUPPLY_PERIODS),
+    (Work::SPEED_BOUNDS, 5, SUPPLY_PERIODS),
     (Work::OBSERVER_GAINS, 6, CYCLE),
     (Work::DELAY_COMPENSATION, 10, CYCLE),
     (Work::SETPOINT, 10, CYCLE),
@@ -182,6 +182,13 @@ pub(super) type Slot = u8;
 pub(super) fn next(slot: &mut Slot) -> Work {
     *slot = (*slot & !(CYCLE as u8 - 1)) | ((*slot + 1) % CYCLE as u8);
     SLOTS.as_flattened()[usize::from(*slot) % (2 * CYCLE as usize)]
+}
+
+/// Returns true if the slot has no work, or in a start only a little.
+#[inline(always)] // in each period
+pub(super) fn is_light(slot: Slot) -> bool {
+    let work = SLOTS.as_flattened()[usize::from(slot) % (2 * CYCLE as usize)];
+    work == Work::NOTHING || work == Work::SUPPLY
 }
 
 /// Switches to the start's schedule, or to Run's.

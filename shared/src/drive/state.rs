@@ -26,14 +26,20 @@ pub struct LastFault {
     pub phase: Phase,
 }
 
+/// Marks the first period of a phase of rest.
+const BEGUN: u8 = u8::MAX;
+
+/// Most periods in which a phase of rest begins, after its first.
+const BEGINNING_PERIODS: u8 = 16;
+
 /// Everything that `step` remembers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     pub(super) phase: Phase,
     /// The kind of set-point for which field-oriented control drives, or [`NO_KIND`].
     foc_kind: u8,
-    /// The present phase, one of rest, has just begun.
-    enters_rest: bool,
+    /// Periods until the present phase, one of rest, has begun in full; [`BEGUN`] in its first.
+    enters_rest: u8,
     pub(super) shared: Shared,
     pub(super) off: off::State,
     pub(super) charge: charge::State,
@@ -50,7 +56,7 @@ impl State {
         Self {
             phase: Phase::Idle,
             foc_kind: NO_KIND,
-            enters_rest: false,
+            enters_rest: 0,
             shared: Shared::new(config),
             off: off::State::new(config),
             charge: charge::State::default(),
@@ -81,7 +87,7 @@ impl State {
     fn restart(&mut self, config: &Config) {
         let latch = self.shared.latch.clone();
         self.phase = Phase::Idle;
-        self.enters_rest = false;
+        self.enters_rest = 0;
         self.shared = Shared::new(config);
         self.shared.latch = latch;
         self.off = off::State::new(config);
@@ -107,16 +113,40 @@ impl State {
     }
 
     /// Returns the bridge for the first period of a phase of rest. The phase's own work begins in the next period,
-    /// because the terminals are still driven in this one.
+    /// because the terminals are still driven in this one. Some periods later the drives forget: a drive may end in a
+    /// long period.
+    #[inline(always)] // in each period but those of field-oriented control
     pub(super) fn enters_rest(&mut self) -> Option<Bridge> {
-        core::mem::take(&mut self.enters_rest).then(|| {
+        if self.enters_rest == 0 {
+            None
+        } else {
+            self.begin_rest()
+        }
+    }
+
+    #[cold]
+    #[inline(never)] // only some periods
+    fn begin_rest(&mut self) -> Option<Bridge> {
+        let brakes = self.phase == Phase::Brake;
+        if self.enters_rest == BEGUN {
+            self.enters_rest = BEGINNING_PERIODS;
             self.shared.applied.rest();
-            if self.phase == Phase::Brake {
-                Bridge::Brake
-            } else {
-                Bridge::Off
-            }
-        })
+            return Some(if brakes { Bridge::Brake } else { Bridge::Off });
+        }
+        self.enters_rest -= 1;
+        // In Brake the observer runs on, and is to see no voltage. Else the rotor is looked for, which takes long in most
+        // periods.
+        let is_now = brakes || self.off.does_little() || self.enters_rest == 1;
+        if is_now && self.enters_rest > 0 {
+            self.forget_drives();
+            self.enters_rest = 1;
+        }
+        None
+    }
+
+    fn forget_drives(&mut self) {
+        self.foc.rest();
+        self.six_step.rest();
     }
 
     /// Records the kind of set-point for which field-oriented control drives, if it drives.
@@ -142,6 +172,11 @@ impl State {
             debug_assert!(false, "{from:?} does not end by {why:?}");
             return;
         };
+        if self.enters_rest != 0 && self.enters_rest != BEGUN {
+            // Before the next mode sets anything.
+            self.forget_drives();
+            self.enters_rest = 0;
+        }
         self.phase = to;
         schedule::choose(&mut self.foc.loops.slot, to.is_open_loop());
         if to.is_off() || to == Phase::Brake {
@@ -188,12 +223,10 @@ impl State {
         if !from.is_off() && from != Phase::Charge {
             self.off.forget();
         }
-        self.enters_rest = true;
+        self.enters_rest = BEGUN;
         self.foc_kind = NO_KIND;
         shared.progress = Default::default();
         shared.seen.rest();
-        self.foc.rest();
-        self.six_step.rest();
     }
 
     /// Sets the rotor's position at the next sample, as an encoder does: electrical angle and speed for the phase
@@ -230,6 +263,21 @@ impl State {
             fault,
             phase,
         }
+    }
+
+    /// Returns the phase.
+    #[inline(always)] // in each period
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Returns true if the last period, which began in this phase, was none of the long ones: the firmware's own work
+    /// fits there.
+    #[inline(always)] // in each period
+    pub fn has_done_little(&self, began_in: Phase) -> bool {
+        began_in == self.phase
+            && self.enters_rest == 0
+            && (!self.foc_drives() || schedule::is_light(self.foc.loops.slot))
     }
 
     /// Returns a copy for the tasks.

@@ -144,46 +144,47 @@ impl Record {
             Bridge::Duty(_) | Bridge::Brake => [0; 3],
             Bridge::Off | Bridge::Charge(_) => [NO_DUTY; 3],
         };
-        let mut tripped = false;
         if matches!(bridge, Bridge::Off) {
-            let last = state.last_fault();
-            if self.counted.load(Relaxed) != last.count {
-                self.counted.store(last.count, Relaxed);
-                let noted = self.get(place::NOTED);
-                let what = last.fault as u32 | (last.phase as u32) << 8;
-                let (_, speed) = state.rotor();
-                let at = place::FAULTS + ROW * (noted as usize % FAULTS);
-                self.put(at, what | self.get(place::STARTS) << 16);
-                self.put(at + 1, period);
-                let speed = speed.to_bits() as u32;
-                self.put(at + 2, halves(speed, counts(sample.bus)));
-                let period_s = config.scale.period_s.to_bits();
-                self.put(at + 3, period_s);
-                self.put(place::NOTED, noted + 1);
-                tripped = free && written != self.rested.load(Relaxed);
-                if tripped {
-                    self.put(place::PERIOD_S, period_s);
-                    self.put(place::HOLDER, noted + 1);
-                    self.taken.store(0, Relaxed);
-                }
-            }
-            self.rested.store(written, Relaxed);
-            if !tripped {
+            let tripped = self.counted.load(Relaxed) != state.last_fault().count;
+            if tripped && free && written != self.rested.load(Relaxed) {
+                // The period of a trip is long: the fault itself waits for the next one.
+                self.put(place::PERIOD_S, config.scale.period_s.to_bits());
+                self.put(place::HOLDER, self.get(place::NOTED) + 1);
+                self.taken.store(0, Relaxed);
+                self.write(written, state, sample, duties);
+                let held = next(written) | HELD;
+                self.put(place::WRITTEN, held);
+                self.rested.store(held, Relaxed);
                 return;
             }
-        } else if !free {
-            // A tune at the next start, or a held shaft, overwrites nothing.
-            if self.taken.load(Relaxed) != 0 && state.drives() {
-                self.taken.store(0, Relaxed);
-                self.put(place::WRITTEN, 0);
+            self.rested.store(written, Relaxed);
+            if tripped {
+                self.note_fault(config, state, sample, period);
             }
-            return;
+        } else if free {
+            self.write(written, state, sample, duties);
+            self.put(place::WRITTEN, next(written));
+        } else if self.taken.load(Relaxed) != 0 && state.drives() {
+            // A tune at the next start, or a held shaft, overwrites nothing.
+            self.taken.store(0, Relaxed);
+            self.put(place::WRITTEN, 0);
         }
-        self.write(written, state, sample, duties);
-        self.put(
-            place::WRITTEN,
-            next(written) | if tripped { HELD } else { 0 },
-        );
+    }
+
+    /// Records the last fault.
+    fn note_fault(&self, config: &Config, state: &State, sample: &Sample, period: u32) {
+        let last = state.last_fault();
+        self.counted.store(last.count, Relaxed);
+        let noted = self.get(place::NOTED);
+        let what = last.fault as u32 | (last.phase as u32) << 8;
+        let (_, speed) = state.rotor();
+        let at = place::FAULTS + ROW * (noted as usize % FAULTS);
+        self.put(at, what | self.get(place::STARTS) << 16);
+        self.put(at + 1, period);
+        let speed = speed.to_bits() as u32;
+        self.put(at + 2, halves(speed, counts(sample.bus)));
+        self.put(at + 3, config.scale.period_s.to_bits());
+        self.put(place::NOTED, noted + 1);
     }
 
     /// Notes that someone has read the held periods: the next driven ones may replace them.

@@ -25,18 +25,18 @@ use siskin_control::params::{ParamId, Params};
 /// 7083 clocks per period, an 84 MHz one 3500.
 const STEP_MAX: Bounds = Bounds {
     median: 330,
-    most: 635,
+    most: 625,
 };
 
 /// Instructions of the whole interrupt around it, in the first board's flight image: from the converters' registers to
 /// the timer's, including taking the set-point, writing the fault record and publishing the snapshot.
 const INTERRUPT_MAX: Bounds = Bounds {
-    median: 500,
-    most: 930,
+    median: 460,
+    most: 840,
 };
 
 /// The most of them in a period of steady flight: neither the mode changes nor the kind of set-point.
-const STEADY_MOST: u32 = 800;
+const STEADY_MOST: u32 = 700;
 
 /// By how many periods each act of the flight is made longer, from none on: what is asked for, a snapshot every 16 periods
 /// or so and a new set-point then meet all slots of the schedule.

@@ -132,6 +132,11 @@ impl State {
         self.stage == Stage::Compare && self.looks >= 2
     }
 
+    /// Returns true if this period only checks the fit of a look: the shortest.
+    pub fn is_check_due(&self) -> bool {
+        self.stage == Stage::CheckFit
+    }
+
     /// Returns true if looks use the mean of four readings.
     pub(super) fn is_slow(&self) -> bool {
         self.omega.saturating_abs() < SLOW

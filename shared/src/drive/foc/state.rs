@@ -51,35 +51,42 @@ traced! {
     }
 }
 
+impl Loops {
+    fn new() -> Self {
+        Self {
+            slot: 0,
+            phase_order: PhaseOrder::NORMAL,
+            reference: Reference::default(),
+            regulator: regulator::State::default(),
+            delay_rotation: SinCos::of(Angle::ZERO),
+            dead_time_sign: Dq::default(),
+            commanded_voltages: [AlphaBeta::default(); 2],
+            inductance: inductance::State::default(),
+            speed: speed::State::default(),
+            torque: torque::State::default(),
+            reference_step: Speed::ZERO,
+            i_d_reference: Current::ZERO,
+            i_q_bounds: Bounds::default(),
+            i_q_shortfall: Current::ZERO,
+            start: start::State::default(),
+        }
+    }
+}
+
 impl State {
     /// Creates the power-up state.
     pub(in crate::drive) fn new() -> Self {
         Self {
-            loops: Loops {
-                slot: 0,
-                phase_order: PhaseOrder::NORMAL,
-                reference: Reference::default(),
-                regulator: regulator::State::default(),
-                delay_rotation: SinCos::of(Angle::ZERO),
-                dead_time_sign: Dq::default(),
-                commanded_voltages: [AlphaBeta::default(); 2],
-                inductance: inductance::State::default(),
-                speed: speed::State::default(),
-                torque: torque::State::default(),
-                reference_step: Speed::ZERO,
-                i_d_reference: Current::ZERO,
-                i_q_bounds: Bounds::default(),
-                i_q_shortfall: Current::ZERO,
-                start: start::State::default(),
-            },
+            loops: Loops::new(),
             observer: observer::State::default(),
         }
     }
 
-    /// Resets to the power-up state.
+    /// Resets to the power-up state. Part by part: a temporary whole state would take the interrupt's stack.
     #[inline(never)] // seldom
     pub(in crate::drive) fn restart(&mut self) {
-        *self = Self::new();
+        self.loops = Loops::new();
+        self.observer = observer::State::default();
     }
 
     /// Ends a drive: the next one inherits only the inductance factor.
