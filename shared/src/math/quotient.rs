@@ -7,24 +7,38 @@ pub fn quotient(numerator: u64, divisor: u32) -> u32 {
 
 /// Returns `numerator / divisor`; the divisor must not be 0.
 ///
-/// A Cortex-M4 divides 32 bits. The compiler's 64-bit routine takes 1 KB to be fast; this one takes a tenth of that,
-/// and about 300 instructions per quotient.
+/// A Cortex-M4 divides 32 bits. The compiler's 64-bit routine takes 1 KB; this is Knuth's algorithm D (The Art of
+/// Computer Programming 2, 4.3.1) with two digits of 16 bits: some 60 instructions.
 #[inline(never)] // many call it
 pub fn divide(numerator: u64, divisor: u32) -> u64 {
     let high = (numerator >> 32) as u32;
-    let mut rest = high % divisor;
-    let mut quotient = numerator as u32;
-    for _ in 0..u32::BITS {
-        // The numerator shifts out of the quotient's word at one end as the quotient shifts in at the other.
-        let carry = rest >> 31 != 0;
-        rest = rest << 1 | quotient >> 31;
-        quotient <<= 1;
-        if carry || rest >= divisor {
-            rest = rest.wrapping_sub(divisor);
-            quotient |= 1;
+    let rest = high % divisor;
+    // With the divisor's top bit set, an estimate is at most two too large.
+    let shift = divisor.leading_zeros();
+    let divisor_shifted = divisor << shift;
+    let shifted = (u64::from(rest) << 32 | u64::from(numerator as u32)) << shift;
+    let low = shifted as u32;
+    let (first, rest) = digit((shifted >> 32) as u32, low >> 16, divisor_shifted);
+    let (second, _) = digit(rest, low & 0xffff, divisor_shifted);
+    u64::from(high / divisor) << 32 | u64::from(first << 16 | second)
+}
+
+/// Divides `rest` and 16 further bits, `next`, by a divisor with its top bit set, which is above `rest`. Returns the digit
+/// and what is left.
+#[inline(always)] // twice
+fn digit(rest: u32, next: u32, divisor: u32) -> (u32, u32) {
+    let (upper, lower) = (divisor >> 16, divisor & 0xffff);
+    let mut digit = rest / upper;
+    let mut left = rest % upper;
+    while digit >> 16 != 0 || digit * lower > (left << 16 | next) {
+        digit -= 1;
+        left += upper;
+        if left >> 16 != 0 {
+            break;
         }
     }
-    u64::from(high / divisor) << 32 | u64::from(quotient)
+    let left = (rest << 16 | next).wrapping_sub(digit.wrapping_mul(divisor));
+    (digit, left)
 }
 
 #[cfg(test)]
