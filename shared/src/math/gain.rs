@@ -70,7 +70,7 @@ impl<A: Number, B: Number> Gain<A, B> {
     }
 
     /// Returns the product with `x`, saturated.
-    #[inline(always)] // in the longest period: a call takes longer
+    #[inline]
     pub fn held(self, x: A) -> B {
         B::from_bits(self.factor.saturating(x.to_bits()))
     }
