@@ -144,6 +144,13 @@ impl Pwm {
             // The main output has been on since the previous period, or a break has turned it off.
             return self.set_compares([compare(a, top), compare(b, top), compare(c, top)]);
         }
+        // All periods of a six-step drive but those with a commutation.
+        if let (Bridge::Legs([a, b, c]), LowSides::Some(open)) = (bridge, self.low_sides)
+            && open == open_legs([a, b, c])
+        {
+            let compare = |duty: Option<Duty>| compare(duty.unwrap_or(Duty::ZERO), self.top);
+            return self.set_compares([compare(a), compare(b), compare(c)]);
+        }
         match (bridge, self.low_sides) {
             (Bridge::Brake, LowSides::Switching) => self.set_compares([0; 3]),
             (Bridge::Off, LowSides::None) => turn_off(self.timer),
@@ -155,7 +162,6 @@ impl Pwm {
     }
 
     /// Applies a command that differs from the previous one in more than its duties.
-    #[cold]
     fn change(&mut self, bridge: Bridge) {
         let switching =
             |[a, b, c]: [Duty; 3]| [Leg::Switching(a), Leg::Switching(b), Leg::Switching(c)];
@@ -165,12 +171,17 @@ impl Pwm {
             Bridge::Charge(share) => (LowSides::Alone, [Leg::Low(share); 3]),
             Bridge::Brake => (LowSides::Switching, switching([Duty::ZERO; 3])),
             Bridge::Duty(duties) => (LowSides::Switching, switching(duties)),
-            Bridge::Legs([a, b, c]) => (LowSides::Some, [open_or(a), open_or(b), open_or(c)]),
+            Bridge::Legs(duties) => {
+                let [a, b, c] = duties;
+                let legs = [open_or(a), open_or(b), open_or(c)];
+                (LowSides::Some(open_legs(duties)), legs)
+            }
         };
         let [a, b, c] = legs;
         let top = self.top;
         self.set_compares([a.compare(top), b.compare(top), c.compare(top)]);
-        let with_high_sides = |low: LowSides| matches!(low, LowSides::Switching | LowSides::Some);
+        let with_high_sides =
+            |low: LowSides| matches!(low, LowSides::Switching | LowSides::Some(_));
         let (present, modes) = match (self.low_sides, wanted) {
             (before, LowSides::Alone) if with_high_sides(before) => (LowSides::None, [Leg::Off; 3]),
             (LowSides::Alone, after) if with_high_sides(after) => {
@@ -246,6 +257,13 @@ enum Leg {
     Switching(Duty),
 }
 
+/// Phases with both switches off, a bit each.
+type OpenLegs = u8;
+
+fn open_legs([a, b, c]: [Option<Duty>; 3]) -> OpenLegs {
+    u8::from(a.is_none()) | u8::from(b.is_none()) << 1 | u8::from(c.is_none()) << 2
+}
+
 /// What the low sides do.
 #[derive(Clone, Copy, PartialEq)]
 enum LowSides {
@@ -253,8 +271,8 @@ enum LowSides {
     None,
     /// Switch without the high sides.
     Alone,
-    /// Alternate with the high sides in the phases that are not off.
-    Some,
+    /// Alternate with the high sides in the phases that are not open: these.
+    Some(OpenLegs),
     /// Alternate with the high sides in all phases.
     Switching,
 }
