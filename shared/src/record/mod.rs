@@ -140,7 +140,7 @@ impl Record {
         let written = self.get(place::WRITTEN);
         let free = written & HELD == 0;
         let duties = match bridge {
-            Bridge::Legs(legs) => legs.map(|leg| leg.map_or(NO_DUTY, Duty::to_bits)),
+            Bridge::Legs(legs) => bits_of_legs(*legs),
             Bridge::Duty(_) | Bridge::Brake => [0; 3],
             Bridge::Off | Bridge::Charge(_) => [NO_DUTY; 3],
         };
@@ -213,6 +213,11 @@ impl Default for Record {
 #[inline(always)] // in each period
 fn next(written: u32) -> u32 {
     (written + 1) & !HELD
+}
+
+fn bits_of_legs([a, b, c]: [Option<Duty>; 3]) -> [u32; 3] {
+    let bits = |duty: Option<Duty>| duty.map_or(NO_DUTY, Duty::to_bits);
+    [bits(a), bits(b), bits(c)]
 }
 
 /// Packs the upper halves of both: one instruction.
