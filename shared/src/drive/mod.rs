@@ -31,7 +31,7 @@
 //!
 //! | reason | decided in |
 //! |---|---|
-//! | the set-point asks for rest, or for the other direction | `mode_change.rs`; six-step: `six_step/period.rs` |
+//! | the set-point asks for rest, or for the other direction | `mode_change.rs`; six-step: `six_step/outer.rs` |
 //! | the set-point is a fault, found outside the drive or by the hardware | `step.rs` |
 //! | a sample beyond a trip | `step.rs`, by [`protection::check`](crate::protection::check) |
 //! | a stop has come to rest; a start has failed; the rotor is lost, or stuck | `foc/open_loop.rs`; six-step: `six_step/start.rs`, `six_step/period.rs` |

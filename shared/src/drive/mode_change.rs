@@ -17,9 +17,8 @@ pub(super) fn mode_change(config: &Config, state: &mut State, setpoint: &Setpoin
             at_rest(config, state, setpoint)
         }
         (phase, None) => driving(config, &mut state.shared, phase, setpoint),
-        (phase, Some(_)) => {
-            six_step::period::mode_change(config, &mut state.shared, phase, setpoint)
-        }
+        // It decides in a period of its own.
+        (_, Some(_)) => None,
     }
 }
 

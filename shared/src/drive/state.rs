@@ -277,7 +277,15 @@ impl State {
     pub fn has_done_little(&self, began_in: Phase) -> bool {
         began_in == self.phase
             && self.enters_rest == 0
-            && (!self.foc_drives() || schedule::is_light(self.foc.loops.slot))
+            && if self.foc_drives() {
+                schedule::is_light(self.foc.loops.slot)
+            } else {
+                match self.phase {
+                    Phase::Tone => false,
+                    phase if phase.drives() => self.six_step.has_done_little(),
+                    phase => !phase.is_off() || self.off.does_little(),
+                }
+            }
     }
 
     /// Returns a copy for the tasks.

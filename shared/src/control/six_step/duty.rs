@@ -20,7 +20,7 @@ const PEAK_SHIFT: u32 = 6;
 pub struct Config {
     /// From speed to duty.
     pub k_p: Gain<Speed, I1F31>,
-    /// From speed to duty per period.
+    /// From speed to duty per period of the outer loop.
     pub k_i: Gain<Speed, I1F31>,
     /// From the current's distance to its bound to the largest duty change per period.
     pub k_b: Gain<Current, I1F31>,
@@ -105,27 +105,22 @@ pub fn range(config: &Config, state: &mut State, i: Current, bounds: Bounds) -> 
     Range { least, greatest }
 }
 
-/// Regulates the current, given the range of equal bounds.
-pub fn current(state: &mut State, range: Range) {
-    state.duty = range.greatest;
-}
-
 /// Moves to this share of the supply as far as the range permits.
 pub fn share(state: &mut State, share: I1F31, range: Range) {
     state.duty = share.min(range.greatest).max(range.least);
 }
 
-/// Regulates the speed; `error` is wanted minus actual. The integral holds while the range limits the duty and the
-/// error pushes further.
-pub fn speed(config: &Config, state: &mut State, error: Speed, range: Range) {
+/// Regulates the speed: returns the wanted duty. `error` is wanted minus actual speed, and `before` the duty that was wanted
+/// before. The integral holds while the range has kept the duty from that and the error pushes further.
+pub fn speed(config: &Config, state: &mut State, (error, before): (Speed, I1F31)) -> I1F31 {
+    let held_below = state.duty < before && error > Speed::ZERO;
+    let held_above = state.duty > before && error < Speed::ZERO;
     let wanted = state.sigma.plus(config.k_p.held(error));
-    state.duty = wanted.min(range.greatest).max(range.least);
-    let held_below = state.duty < wanted && error > Speed::ZERO;
-    let held_above = state.duty > wanted && error < Speed::ZERO;
     if !(held_below || held_above) {
         let sigma = state.sigma.plus(config.k_i.held(error));
         state.sigma = sigma.max(I1F31::ZERO).min(config.duty_max);
     }
+    wanted
 }
 
 /// Starts speed regulation bumplessly from the present duty.
@@ -295,7 +290,7 @@ mod tests {
             for _ in 0..4000 {
                 let bounds = bounds(wanted_a, wanted_a);
                 let range = range(&config, &mut state, amperes(winding.i_a), bounds);
-                current(&mut state, range);
+                share(&mut state, range.greatest, range);
                 winding.period(state.duty);
             }
             assert!((winding.i_a - wanted_a).abs() < 0.05, "{}", winding.i_a);
@@ -346,17 +341,21 @@ mod tests {
         let (config, mut state) = (config(), State::default());
         let (mut speed_now, mut current_a) = (0.0_f64, 0.0_f64);
         let mut most = 0.0_f64;
-        let wanted = 0.02;
+        let (wanted_speed, mut wanted) = (0.02, I1F31::ZERO);
         for _ in 0..40_000 {
             let range = range(&config, &mut state, amperes(current_a), bounds(-5.0, 20.0));
-            let error = Speed::from_num(wanted - speed_now);
-            speed(&config, &mut state, error, range);
+            let error = Speed::from_num(wanted_speed - speed_now);
+            wanted = speed(&config, &mut state, (error, wanted));
+            share(&mut state, wanted, range);
             let across_v = state.duty.to_num::<f64>() * 24.0 - speed_now / 0.0444 * 24.0;
             current_a = across_v / 0.216;
             speed_now += current_a * 0.216 / 24.0 * 0.0444 * 25e-6 / 0.046;
             most = most.max(speed_now);
         }
-        assert!((speed_now / wanted - 1.0).abs() < 0.002, "{speed_now}");
-        assert!(most < 1.1 * wanted, "{most}");
+        assert!(
+            (speed_now / wanted_speed - 1.0).abs() < 0.002,
+            "{speed_now}"
+        );
+        assert!(most < 1.1 * wanted_speed, "{most}");
     }
 }

@@ -18,7 +18,7 @@ pub struct Config {
     pub terminal: Gain<AdcCounts, Voltage>,
     /// Zero crossings.
     pub crossing: crossing::Config,
-    /// From the command to ω*, every period.
+    /// From the command to ω*, every period of the outer loop.
     pub planner: planner::Config,
     /// The outer loop.
     pub duty: duty::Config,

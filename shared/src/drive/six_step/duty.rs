@@ -78,11 +78,17 @@ fn opened(
 }
 
 /// Computes the duty in Run and Stopping.
-pub(super) fn run(
+pub(super) fn run(six_step: &Config, s: &mut State, i: Current) {
+    let range = duty::range(&six_step.duty, &mut s.duty, i, s.bounds);
+    duty::share(&mut s.duty, s.wanted, range);
+}
+
+/// Computes the wanted duty and the current's bounds in Run and Stopping.
+#[inline(never)] // only some periods
+pub(super) fn plan(
     config: &config::Config,
     six_step: &Config,
     (s, shared): (&mut State, &Shared),
-    i: Current,
     setpoint: &Setpoint,
 ) {
     let bounds = shared.protection.bounds;
@@ -115,18 +121,18 @@ pub(super) fn run(
         }
     };
     // Once for all demands: in each of them it would cost 112 bytes more on the chip.
-    let bounds = opened(config, shared, bounds, (present, wanted));
-    let range = duty::range(&six_step.duty, &mut s.duty, i, bounds);
-    match demand {
+    s.bounds = opened(config, shared, bounds, (present, wanted));
+    s.wanted = match demand {
         Demand::Speed(_) => {
             let error = s.planner.reference.saturating_sub(speed);
-            duty::speed(&six_step.duty, &mut s.duty, error, range);
+            s.wanted = duty::speed(&six_step.duty, &mut s.duty, (error, s.wanted));
             return;
         }
-        Demand::Share(share) => duty::share(&mut s.duty, duty_of(six_step, share), range),
-        Demand::Current(_) => duty::current(&mut s.duty, range),
-        Demand::Rest => duty::share(&mut s.duty, I1F31::ZERO, range),
-    }
+        Demand::Share(share) => duty_of(six_step, share),
+        // Its bounds permit one duty only.
+        Demand::Current(_) => s.duty.duty,
+        Demand::Rest => I1F31::ZERO,
+    };
     s.planner = planner::State::begin(slowest);
     duty::take_over(&mut s.duty);
 }
@@ -147,16 +153,19 @@ fn only(current: Current) -> Bounds {
 /// Regulates the current.
 pub(super) fn hold(six_step: &Config, s: &mut State, i: Current, wanted: Current) {
     let range = duty::range(&six_step.duty, &mut s.duty, i, only(wanted));
-    duty::current(&mut s.duty, range);
+    duty::share(&mut s.duty, range.greatest, range);
 }
 
 /// Starts speed regulation from the present speed and duty.
 pub(super) fn take_over(s: &mut State) {
     s.planner = planner::State::begin(s.tracking.omega_bar);
     duty::take_over(&mut s.duty);
+    s.wanted = s.duty.duty;
+    s.plan_next();
 }
 
 /// Returns the bridge in the present sextant.
+#[inline(never)] // two callers
 pub(super) fn bridge(s: &State, swapped: bool, floating: Option<Duty>) -> Bridge {
     let phases = s.sector.phases(Legs {
         switching: Some(s.duty.for_bridge()),

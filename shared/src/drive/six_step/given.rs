@@ -11,19 +11,28 @@ use crate::drive::config::Config;
 use crate::drive::config::six_step;
 use crate::drive::shared::Shared;
 use crate::math::TopProduct;
+use crate::parts::Bench;
 use crate::units::{Angle, Speed, Voltage, stated_emf};
 
 /// Mean back-EMF between two phases over a sextant, relative to a phase's peak: √3·3/π.
 const BETWEEN_PHASES: I2F30 = I2F30::lit("1.6539867");
+
+/// The rotor's angle and speed, if they are given.
+pub(in crate::drive) type Position = Option<(Angle, Speed, Bench)>;
 
 /// Returns the rotor's position and speed as the control sees them, if they are given.
 pub(in crate::drive) fn position(
     config: &Config,
     observer: &observer::State,
     shared: &Shared,
-) -> Option<(Angle, Speed)> {
-    matches!(config.observer, observer::Config::Given(_))
-        .then(|| observer.given.seen(shared.swapped(config)))
+) -> Position {
+    match config.observer {
+        observer::Config::Given(part) => {
+            let (theta, omega) = observer.given.seen(shared.swapped(config));
+            Some((theta, omega, part))
+        }
+        _ => None,
+    }
 }
 
 /// Begins Run at once, with the duty that sustains the rotor's speed without current.
@@ -31,7 +40,7 @@ pub(super) fn begin(
     config: &Config,
     six_step: &six_step::Config,
     (s, shared): (&mut State, &mut Shared),
-    position: (Angle, Speed),
+    position: (Angle, Speed, Bench),
 ) {
     follow(six_step, (s, shared), position);
     let emf = stated_emf(s.tracking.omega.max(Speed::ZERO));
@@ -48,7 +57,7 @@ pub(super) fn begin(
 pub(super) fn follow(
     six_step: &six_step::Config,
     (s, shared): (&mut State, &mut Shared),
-    (theta, omega): (Angle, Speed),
+    (theta, omega, _): (Angle, Speed, Bench),
 ) {
     if omega >= six_step.slow {
         shared.progress.slow_periods = 0;

@@ -6,10 +6,11 @@
 //! commutates at a speed that grows by `STA_RAMP_RPM_S`; crossings correct it as soon as they
 //! appear. Run begins after a full turn of consecutive crossings at `STA_RUN_RPM`.
 //!
-//! Files, each after those it uses: `state`, `duty`, `telemetry`, `given`, `start`, `period`.
+//! Files, each after those it uses: `state`, `duty`, `telemetry`, `outer`, `given`, `start`, `period`.
 
 mod duty;
 pub(super) mod given;
+mod outer;
 pub(super) mod period;
 mod start;
 pub(super) mod state;

@@ -1,9 +1,9 @@
 //! A period of the six-step drive.
 
 use super::duty::{self, NO_CURRENT, bridge, hold, take_over};
+use super::given::Position;
 use super::state::State;
-use super::telemetry;
-use super::{given, start};
+use super::{given, outer, start, telemetry};
 use crate::control::six_step::commutation::{HALF_SEXTANT, SEXTANT};
 use crate::control::six_step::crossing;
 use crate::control::six_step::tracking::KNOWN;
@@ -15,7 +15,7 @@ use crate::drive::seen::reading;
 use crate::drive::shared::Shared;
 use crate::drive::transitions::Why;
 use crate::protection::Fault;
-use crate::units::{AdcCounts, Angle, Speed};
+use crate::units::{AdcCounts, Speed};
 
 /// Weight, in missed sextants, of a crossing for which Ramp waited in vain: three of them end the
 /// start.
@@ -23,28 +23,6 @@ const IMPATIENCE: u8 = 4;
 
 /// Consecutive periods without current after which the shaft counts as standing.
 const STILL_PERIODS: u16 = 1000;
-
-/// The rotor's position, if given.
-type Position = Option<(Angle, Speed)>;
-
-/// Returns the mode change that a set-point asks for while this drive drives.
-pub(in crate::drive) fn mode_change(
-    config: &config::Config,
-    shared: &mut Shared,
-    phase: Phase,
-    setpoint: &Setpoint,
-) -> Option<Why> {
-    let is_to_stop = duty::is_to_stop(setpoint, shared.reversed);
-    match phase {
-        Phase::Stopping if !is_to_stop => Some(Why::Resumed),
-        Phase::Run if is_to_stop => Some(Why::Released),
-        Phase::Park | Phase::Ramp if !shared.is_along(config, setpoint) => {
-            shared.failed_starts = 0;
-            Some(Why::Released)
-        }
-        _ => None,
-    }
-}
 
 /// Returns true if a shaft turns too fast to be parked: it is left to slow down first.
 pub(in crate::drive) fn is_too_fast(
@@ -112,6 +90,7 @@ pub(in crate::drive) fn period(
     (sample, setpoint): (&Sample, &Setpoint),
     currents: [AdcCounts; 3],
 ) -> (Bridge, Option<Why>) {
+    s.next();
     if phase == Phase::Park {
         return start::park(config, six_step, (s, shared), currents, setpoint);
     }
@@ -144,24 +123,18 @@ pub(in crate::drive) fn period(
             (shown, why) = (Phase::Run, Some(Why::HandedOver));
         }
     } else {
-        duty::run(config, six_step, (s, shared), i, setpoint);
+        duty::run(six_step, s, i);
+        if !s.is_busy {
+            let slow = s.tracking.omega_bar < six_step.slow;
+            let rotor_is = (slow, position.is_some());
+            why = rotor(config, six_step, (s, shared), phase, rotor_is);
+        }
     }
-    telemetry::update(config, (s, shared), shown, (currents, i));
-    let bridge = bridge(s, swapped, None);
-    if ramping {
-        return (bridge, why);
+    telemetry::update(config, (s, shared), shown, currents);
+    if why.is_none() && s.is_due() {
+        why = outer::run(config, six_step, (s, shared), setpoint, (currents, i));
     }
-    let slow = s.tracking.omega_bar < six_step.slow;
-    (
-        bridge,
-        rotor(
-            config,
-            six_step,
-            (s, shared),
-            phase,
-            (slow, position.is_some()),
-        ),
-    )
+    (bridge(s, swapped, None), why)
 }
 
 /// Returns how the rotor ends Run or Stopping.
@@ -215,6 +188,7 @@ fn crossings(
     );
     if let Some(age) = found {
         s.tracking.crossed(age);
+        s.is_busy = true;
         s.missed = 0;
     }
     commutate(six_step, s, ramping);
@@ -252,6 +226,7 @@ fn commutate(six_step: &Config, s: &mut State, ramping: bool) {
     if !s.crossing.found {
         s.missed += sextants;
     }
+    s.is_busy = true;
     s.sector = s.sector.next();
     s.crossing.begin(&six_step.crossing);
 }

@@ -4,7 +4,7 @@ use fixed::types::I36F28;
 
 use super::duty::{bridge, hold};
 use super::state::{FIRST_PARK, State};
-use super::telemetry;
+use super::{outer, telemetry};
 use crate::control::six_step::commutation::{Legs, Sector};
 use crate::control::six_step::{crossing, tracking};
 use crate::drive::config;
@@ -38,6 +38,7 @@ pub(super) fn current(six_step: &Config, shared: &Shared, setpoint: &Setpoint) -
 /// Holds the rotor along the switching leg's phase. The other two legs are both held low instead of one floating:
 /// the current that the rotor's swing induces flows between them without dead time in its way, damps the swing and
 /// shows its direction.
+#[cold]
 pub(super) fn park(
     config: &config::Config,
     six_step: &Config,
@@ -48,17 +49,23 @@ pub(super) fn park(
     let wanted = current(six_step, shared, setpoint);
     let swapped = shared.swapped(config);
     let currents = in_order(swapped, currents);
+    let [a, b, c] = [
+        reading(currents[0]),
+        reading(currents[1]),
+        reading(currents[2]),
+    ];
     let Legs {
         switching,
         low,
         floating,
-    } = s.sector.legs(currents.map(reading));
+    } = s.sector.legs([a, b, c]);
     // A swinging rotor drives a current through the other two, which may be the largest.
     hold(six_step, s, greatest([switching, low, floating]), wanted);
     // Counts at most the first attempt's current: a larger one damps the swing no sooner. Twice as long after a
     // failed start.
     s.charge += wanted.min(six_step.start_current).over_periods(1);
     let long = six_step.park_charge * (1 + i64::from(shared.failed_starts > 0));
+    let mut is_aligned = false;
     if s.sector == FIRST_PARK {
         if s.charge >= long {
             s.charge = I36F28::ZERO;
@@ -77,16 +84,26 @@ pub(super) fn park(
                 certain
             };
         let at_end = was_forwards && !s.swings_forwards && s.charge >= long * 2;
-        if at_end || s.charge >= long * 3 {
-            s.sector = FIRST_RAMP;
-            s.tracking = tracking::State::at_rest(six_step.ramp.apply(wanted));
-            s.crossing = crossing::State::default();
-            telemetry::update(config, (s, shared), Phase::Ramp, (currents, switching));
-            return (bridge(s, swapped, None), Some(Why::Aligned));
-        }
+        is_aligned = at_end || s.charge >= long * 3;
     }
-    telemetry::update(config, (s, shared), Phase::Park, (currents, switching));
-    (bridge(s, swapped, Some(Duty::ZERO)), None)
+    let (phase, floating) = if is_aligned {
+        s.sector = FIRST_RAMP;
+        s.tracking = tracking::State::at_rest(six_step.ramp.apply(wanted));
+        s.crossing = crossing::State::default();
+        (Phase::Ramp, None)
+    } else {
+        (Phase::Park, Some(Duty::ZERO))
+    };
+    telemetry::update(config, (s, shared), phase, currents);
+    let why = if is_aligned {
+        Some(Why::Aligned)
+    } else if s.is_due() {
+        let readings = (currents, switching);
+        outer::run(config, six_step, (s, shared), setpoint, readings)
+    } else {
+        None
+    };
+    (bridge(s, swapped, floating), why)
 }
 
 /// Handles loss of synchronism: another start, or none. A motor that is being stopped loses nothing and coasts.

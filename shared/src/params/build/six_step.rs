@@ -59,7 +59,7 @@ pub(super) fn six_step(p: &Si, duty_max: f32, place: &mut Config) {
         ParamId::PwmFreqHz,
         TOO_FEW_PERIODS,
     );
-    outer::planner(p, p.t, &mut place.planner);
+    outer::planner(p, p.outer_t, &mut place.planner);
     let crossing = &mut place.crossing;
     let v_per_count = p.board.terminal_v_per_count;
     crossing.least = p.voltage((LEAST_COUNTS * v_per_count).max(LEAST_V));
@@ -73,7 +73,7 @@ pub(super) fn six_step(p: &Si, duty_max: f32, place: &mut Config) {
     let corner_rad_s = CORNER_SHARE * TAU * p.settings.speed_hz;
     let bound_a = p.limit_a.max(BOUND_LEAST_A);
     duty.k_p = p.gain(ParamId::CtlRpmMax, k_p);
-    duty.k_i = p.gain(ParamId::CtlBwSpdHz, k_p * corner_rad_s * p.t);
+    duty.k_i = p.gain(ParamId::CtlBwSpdHz, k_p * corner_rad_s * p.outer_t);
     duty.k_b = p.gain(ParamId::LimPhaseA, BOUND_RATE * p.t * p.unit_a / bound_a);
     duty.lead_to_zero_max = p.scale.current_from_a(LEAD_SHARE * p.limit_a);
     duty.duty_max = I1F31::from_f32(duty_max);
