@@ -1,5 +1,6 @@
 //! How the processor's time is spent: figures for the PWM interrupt, and how soon a throttle acts.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
@@ -17,6 +18,8 @@ pub struct Load {
     /// When the measurement began.
     since: Cycles,
     spent: Cycles,
+    /// How often it has taken each number of cycles.
+    took: BTreeMap<Cycles, u64>,
     times: u64,
     instructions: u64,
     longest_instructions: u64,
@@ -82,6 +85,7 @@ impl Load {
             self.spent += spent;
             self.instructions += count;
             self.longest = self.longest.max(spent);
+            *self.took.entry(spent).or_default() += 1;
             self.longest_instructions = self.longest_instructions.max(count);
         }
     }
@@ -109,6 +113,16 @@ impl Load {
         }
     }
 
+    fn median(&self) -> Cycles {
+        let mut seen = 0;
+        let mut took = self.took.iter();
+        let median = took.find(|(_, times)| {
+            seen += **times;
+            2 * seen > self.times
+        });
+        median.map_or(0, |(cycles, _)| *cycles)
+    }
+
     /// Returns the figures at a time.
     pub fn figures(&self, now: Cycles) -> Option<Figures> {
         let us = |cycles: Cycles| cycles as f64 * 1e6 / CLOCK_HZ as f64;
@@ -120,6 +134,7 @@ impl Load {
             instructions_mean: mean(self.instructions, self.times)?,
             instructions_most: self.longest_instructions,
             cycles_mean: mean(self.spent, self.times)?,
+            cycles_median: self.median(),
             cycles_most: self.longest,
             load_percent: 100.0 * self.spent as f64 / passed.max(1) as f64,
             entry_cycles: [soonest, self.latest],
@@ -141,6 +156,8 @@ pub struct Figures {
     pub instructions_most: u64,
     /// Mean cycles from entry to return.
     pub cycles_mean: f64,
+    /// Their median.
+    pub cycles_median: Cycles,
     /// Maximum cycles from entry to return.
     pub cycles_most: Cycles,
     /// Its share of the processor.
@@ -213,6 +230,7 @@ mod tests {
         assert_eq!(figures.instructions_mean, 350.0);
         assert_eq!(figures.instructions_most, 600);
         assert_eq!((figures.cycles_mean, figures.cycles_most), (400.0, 700));
+        assert_eq!(figures.cycles_median, 500);
         assert!((figures.load_percent - 100.0 * 1600.0 / 12_000.0).abs() < 1e-9);
         assert_eq!(figures.entry_cycles, [12, 20]);
         assert_eq!(figures.throttle_us_most, Some(30.0));
