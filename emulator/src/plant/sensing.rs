@@ -88,6 +88,7 @@ impl Sensing {
             refresh_s: 1e-6,
             charge_s: 63e-6,
             least_dead_time: LeastDeadTime::NONE,
+            pwm_bounds: &[],
         }
     }
 

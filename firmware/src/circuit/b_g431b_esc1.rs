@@ -2,7 +2,8 @@
 
 use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
-use siskin_control::params::{Board, LeastDeadTime};
+use siskin_control::params::{Board, LeastDeadTime, ParamId, PwmBound};
+use siskin_control::parts;
 use siskin_control::protection::Ntc;
 
 use crate::image;
@@ -51,6 +52,44 @@ pub const TERMINAL_DIVIDER: f32 = 2.2 / (2.2 + 10.0);
 /// Current rating of the board, peak A. The converter's range is wider: 75 A into the motor, 45 A out of it.
 pub const RATING_A: f32 = 40.0;
 
+/// The drive that every image has. `tests/virtual-board` plays this bound and those below, and all other choices at the end
+/// of the parameter's range.
+const SIX_STEP_BOUND: PwmBound = PwmBound {
+    choice: (ParamId::CtlDrive, 1.0),
+    hz: 44_000.0,
+    refusal: "at most 44000 in six-step",
+};
+
+/// Those of an image with parts of the papers.
+const PWM_BOUNDS: [PwmBound; 6] = [
+    PwmBound {
+        choice: (ParamId::CtlObserver, 1.0),
+        hz: 30_000.0,
+        refusal: "at most 30000 with CTL_OBSERVER 1",
+    },
+    PwmBound {
+        choice: (ParamId::CtlObserver, 2.0),
+        hz: 30_000.0,
+        refusal: "at most 30000 with CTL_OBSERVER 2",
+    },
+    PwmBound {
+        choice: (ParamId::CtlObserver, 0.0),
+        hz: 36_000.0,
+        refusal: "at most 36000 with CTL_OBSERVER 0",
+    },
+    PwmBound {
+        choice: (ParamId::CtlRegulator, 0.0),
+        hz: 36_000.0,
+        refusal: "at most 36000 with CTL_REGULATOR 0",
+    },
+    SIX_STEP_BOUND,
+    PwmBound {
+        choice: (ParamId::CtlRegulator, 2.0),
+        hz: 56_000.0,
+        refusal: "at most 56000 with CTL_REGULATOR 2",
+    },
+];
+
 /// The board as the control needs to know it.
 pub const BOARD: Board = Board {
     image: image::identity(NAME, 1),
@@ -77,6 +116,10 @@ pub const BOARD: Board = Board {
         ns: 750.0,
         refusal: "below this board's 750 ns",
     },
+    pwm_bounds: match parts::CHOICE {
+        parts::Choice::Flight => &[SIX_STEP_BOUND],
+        _ => &PWM_BOUNDS,
+    },
 };
 
 /// The thermistor: 10 kΩ at 25 °C over 4.7 kΩ, giving 1.055 V at 25 °C as in ST's motor control kit for this
@@ -94,8 +137,21 @@ mod tests {
     fn a_refusal_of_a_dead_time_names_the_least() {
         for least in [BOARD, super::super::vesc4_f405::BOARD].map(|board| board.least_dead_time) {
             assert!(least.refusal.contains(&format!(" {} ns", least.ns)));
-            // After the parameter's name in a text of 50 bytes, with what has been done.
-            assert!("PWM_DEADTIME_NS , raised".len() + least.refusal.len() <= 50);
+            // After the parameter's name in a text of 50 bytes.
+            assert!("PWM_DEADTIME_NS: ".len() + least.refusal.len() <= 50);
+        }
+    }
+
+    #[test]
+    fn a_refusal_of_a_pwm_frequency_names_the_highest_and_its_cause() {
+        for bound in BOARD.pwm_bounds {
+            let (id, value) = bound.choice;
+            let cause = match id {
+                ParamId::CtlDrive => "in six-step".to_owned(),
+                _ => format!("with {} {value}", id.entry().name),
+            };
+            assert_eq!(bound.refusal, format!("at most {} {cause}", bound.hz));
+            assert!("PWM_FREQ_HZ: ".len() + bound.refusal.len() <= 50);
         }
     }
 

@@ -46,6 +46,7 @@ pub const BOARD: Board = Board {
         ns: 360.0,
         refusal: "below this board's 360 ns",
     },
+    pwm_bounds: &[],
 };
 
 /// The transistors' thermistor.

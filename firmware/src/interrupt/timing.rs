@@ -68,6 +68,7 @@ mod tests {
         refresh_s: 3e-6,
         charge_s: 60e-6,
         least_dead_time: LeastDeadTime::NONE,
+        pwm_bounds: &[],
     };
 
     /// Clocks of a code, from the reference manuals (RM0440 and RM0090, TIM1_BDTR.DTG).

@@ -102,8 +102,8 @@ pub enum Fit {
     /// They fit.
     #[default]
     Whole,
-    /// They fit with the board's dead time.
-    Raised,
+    /// They fit with a change of this parameter for this reason.
+    Changed(ParamId, &'static str),
     /// They do not fit.
     Refused,
 }
@@ -118,8 +118,8 @@ pub enum Fit {
 pub fn power_up(flash: &mut Storage, fit: &mut Fit) -> Esc {
     let board = board();
     let mut params = stored_params(flash);
-    if params.fit(&board) {
-        *fit = Fit::Raised;
+    if let Some((id, reason)) = params.fit(&board) {
+        *fit = Fit::Changed(id, reason);
     }
     if check(&params, &board).is_err() {
         *fit = Fit::Refused;
@@ -137,10 +137,10 @@ fn tell(esc: &mut Esc, fit: Fit) {
     let mut warning = Warning::new();
     match fit {
         Fit::Whole => return,
-        Fit::Raised => {
-            push(&mut warning, "PWM_DEADTIME_NS ");
-            push(&mut warning, BOARD.least_dead_time.refusal);
-            push(&mut warning, ", raised");
+        Fit::Changed(id, reason) => {
+            push(&mut warning, id.entry().name);
+            push(&mut warning, ": ");
+            push(&mut warning, reason);
         }
         Fit::Refused => {
             esc.lose_stored();

@@ -33,6 +33,15 @@ impl Params {
         needed.into_iter().find(|id| self.get(*id) == 0.0)
     }
 
+    /// Returns true if the drive in force is the six-step drive.
+    pub(super) fn drives_by_six_step(&self) -> bool {
+        match self.choice() {
+            CtlDrive::FieldOriented => false,
+            CtlDrive::SixStep => true,
+            CtlDrive::Automatic => self.unknown().is_some(),
+        }
+    }
+
     /// Returns the parameters that a drive is built from: `CTL_DRIVE` is decided, and what is unknown of the motor is
     /// assumed.
     ///
@@ -70,7 +79,7 @@ impl Params {
             made.assume(ParamId::MotJGcm2, 1e7 * inertia_kgm2);
         }
         if self.chosen(CtlDrive::Automatic) {
-            let drive = if unknown {
+            let drive = if self.drives_by_six_step() {
                 CtlDrive::SixStep
             } else {
                 CtlDrive::FieldOriented

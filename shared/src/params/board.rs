@@ -3,6 +3,8 @@
 use crate::control::delay::Delay;
 use crate::control::sensing::Shunts;
 use crate::image::Image;
+use crate::params::table::ParamId;
+use crate::params::values::Params;
 
 /// The board's properties that the control must know.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +32,20 @@ pub struct Board {
     pub charge_s: f32,
     /// Lower bound of `PWM_DEADTIME_NS`, and its default where the table's is shorter.
     pub least_dead_time: LeastDeadTime,
+    /// Choices whose longest period bounds `PWM_FREQ_HZ`, the lowest bound first; all else fits up to the end of the
+    /// parameter's range.
+    pub pwm_bounds: &'static [PwmBound],
+}
+
+/// The highest PWM frequency at which a choice's longest period fits the interrupt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PwmBound {
+    /// The parameter, and its choice. One of another than `CTL_DRIVE` counts in the field-oriented drive.
+    pub choice: (ParamId, f32),
+    /// In Hz.
+    pub hz: f32,
+    /// Why a higher one is refused, with its number.
+    pub refusal: &'static str,
 }
 
 /// The shortest dead time that a board's drivers and transistors tolerate.
@@ -50,6 +66,19 @@ impl LeastDeadTime {
 }
 
 impl Board {
+    /// Returns the bound of `PWM_FREQ_HZ` for the choices in force, if there is one.
+    pub(super) fn pwm_bound(&self, params: &Params) -> Option<&'static PwmBound> {
+        let six_step = params.drives_by_six_step();
+        self.pwm_bounds.iter().find(|bound| {
+            let (id, value) = bound.choice;
+            match id {
+                ParamId::CtlDrive => six_step,
+                // A choice that this build lacks is kept, and another is in force.
+                _ => !six_step && params.get(id) == value && !id.lacks(value),
+            }
+        })
+    }
+
     /// The sensors of the emulator's bench: 12 bits over ±40 A and 70 V.
     pub(crate) const BENCH: Self = Self {
         image: Image::EMULATOR,
@@ -63,5 +92,6 @@ impl Board {
         refresh_s: 1e-6,
         charge_s: 63e-6,
         least_dead_time: LeastDeadTime::NONE,
+        pwm_bounds: &[],
     };
 }

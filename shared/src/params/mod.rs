@@ -10,7 +10,7 @@ mod table;
 mod values;
 
 pub(crate) use assumed::POLE_PAIRS;
-pub use board::{Board, LeastDeadTime};
+pub use board::{Board, LeastDeadTime, PwmBound};
 pub use build::{BuildError, FluxSettings, build, build_in, input, scale};
 pub(crate) use build::{TRIP_SHARE, lost_periods, test_current, thresholds, unbalance_max};
 pub use from_motor::FromMotor;

@@ -32,6 +32,7 @@ pub fn set_up(params: &Params, board: &Board) -> [u32; SET_UP_WORDS] {
         charge_s,
         // The requester has built it before.
         least_dead_time: _,
+        pwm_bounds: _,
     } = *board;
     let mut words = [0; SET_UP_WORDS];
     let (table, rest) = words.split_at_mut(TABLE.len());
@@ -74,6 +75,7 @@ pub fn read_set_up(words: &[u32; SET_UP_WORDS]) -> (Params, Board) {
         },
         delay: Delay::One,
         least_dead_time: LeastDeadTime::NONE,
+        pwm_bounds: &[],
     };
     (params, board)
 }

@@ -308,6 +308,10 @@ fn refuse_contradictions(p: &Si) {
             TOO_FEW_PERIODS,
         );
     }
+    if let Some(bound) = p.board.pwm_bound(p.params) {
+        let pwm_hz = p.get(ParamId::PwmFreqHz);
+        above(pwm_hz, bound.hz, ParamId::PwmFreqHz, bound.refusal);
+    }
     let protocol = p.params.number(ParamId::InpProto);
     p.refuse_if(
         protocol != 0 && Signal::from_number(protocol).is_none(),
@@ -384,7 +388,7 @@ mod tests {
     use super::*;
     use crate::control::delay::Delay;
     use crate::params::BOSSO_MOTOR;
-    use crate::params::board::LeastDeadTime;
+    use crate::params::board::{LeastDeadTime, PwmBound};
 
     #[test]
     fn the_defaults_make_a_drive() {
@@ -470,16 +474,49 @@ mod tests {
         build(&params, &Board::BENCH).expect("an ideal inverter");
 
         // A chosen value is reported; the table's default, which nobody chose, is not.
-        assert!(params.fit(&board));
+        let told = params.fit(&board).expect("it is changed");
+        assert_eq!(told, (ParamId::PwmDeadtimeNs, "below this board's 750 ns"));
         assert_eq!(params.get(ParamId::PwmDeadtimeNs), 750.0);
         let mut params = Params::of(&BOSSO_MOTOR);
-        assert!(!params.fit(&board));
+        assert_eq!(params.fit(&board), None);
         assert_eq!(params.get(ParamId::PwmDeadtimeNs), 750.0);
         build(&params, &board).expect("the board's default");
         // A value that is long enough stays.
         params.set(ParamId::PwmDeadtimeNs, 900.0).expect("in range");
-        assert!(!params.fit(&board));
+        assert_eq!(params.fit(&board), None);
         assert_eq!(params.get(ParamId::PwmDeadtimeNs), 900.0);
+    }
+
+    #[test]
+    fn a_pwm_frequency_above_that_of_a_choice_in_force_is_refused() {
+        let board = Board {
+            pwm_bounds: &[PwmBound {
+                choice: (ParamId::CtlObserver, 1.0),
+                hz: 30_000.0,
+                refusal: "at most 30000 with CTL_OBSERVER 1",
+            }],
+            ..Board::BENCH
+        };
+        let of = |settings: &[(ParamId, f32)]| {
+            let mut params = Params::of(&BOSSO_MOTOR);
+            for (id, value) in settings {
+                params.set(*id, *value).expect("in range");
+            }
+            build(&params, &board).err()
+        };
+        let observed = (ParamId::CtlObserver, 1.0);
+        let pwm = |hz| (ParamId::PwmFreqHz, hz);
+        assert_eq!(of(&[observed, pwm(30_000.0)]), None);
+        let error = of(&[observed, pwm(30_001.0)]).expect("too high");
+        assert_eq!(error.param, ParamId::PwmFreqHz);
+        assert_eq!(error.reason, "at most 30000 with CTL_OBSERVER 1");
+        assert_eq!(of(&[pwm(30_001.0)]), None, "another observer");
+        let six_step = (ParamId::CtlDrive, 1.0);
+        assert_eq!(
+            of(&[observed, six_step, pwm(30_001.0)]),
+            None,
+            "no observer"
+        );
     }
 
     #[test]
