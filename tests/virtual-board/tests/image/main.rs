@@ -11,6 +11,7 @@
 //! | [`identify`] | it identifies its motor, by command and by parameter, and keeps the result |
 //! | [`failures`] | panic, fault, standstill, break and lockup turn the bridge off |
 //! | [`overruns`] | periods that take too long turn the bridge off, and a flight goes on after them |
+//! | [`cycles`] | every mode's longest period fits at any PWM frequency that is accepted |
 //! | [`damaged`] | a damaged image never turns the bridge on |
 //! | [`agreement`] | the control's state and the motor agree with the emulator's |
 //!
@@ -24,6 +25,7 @@
 mod agreement;
 mod boot;
 mod common;
+mod cycles;
 mod damaged;
 mod failures;
 mod flight_controller;
