@@ -37,6 +37,13 @@ MEASURED = [
         [("maximum", "at most 700")],
     ),
     (
+        "longest interrupt at its highest PWM",
+        "share of the period",
+        "modes",
+        r"^six-step, 44 kHz +full throttle +\d+ +\d+ +([\d.]+)$",
+        [("six-step at full throttle", "at most 0.70")],
+    ),
+    (
         "PWM interrupt, on the virtual board",
         "estimated cycles",
         "virtual-board",

@@ -133,6 +133,8 @@ pub const NTC: Ntc = Ntc {
 mod tests {
     use super::*;
 
+    const GUIDE: &str = include_str!("../../README.md");
+
     #[test]
     fn a_refusal_of_a_dead_time_names_the_least() {
         for least in [BOARD, super::super::vesc4_f405::BOARD].map(|board| board.least_dead_time) {
@@ -152,6 +154,12 @@ mod tests {
             };
             assert_eq!(bound.refusal, format!("at most {} {cause}", bound.hz));
             assert!("PWM_FREQ_HZ: ".len() + bound.refusal.len() <= 50);
+            let row = format!("| `{}` {value}", id.entry().name);
+            let mut rows = GUIDE.lines().filter(|line| line.starts_with(&row));
+            assert!(
+                rows.any(|row| row.ends_with(&format!("| {} |", bound.hz))),
+                "{row}"
+            );
         }
     }
 
