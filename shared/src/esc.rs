@@ -18,6 +18,7 @@ use crate::mavlink::Four;
 use crate::mavlink::{Component, Context, Frame, NO_REBOOT_ARMED, Request, Warning};
 use crate::params::{Board, BuildError, ParamId, Params, TRIP_SHARE, build_in, scale};
 use crate::record::Record;
+use crate::setpoint::Use;
 use crate::statistics::Recorder;
 use crate::telemetry::{Charge, Telemetry};
 use crate::throttle::{LockThrottle, LockedAuthority, TaskDemands, Throttle};
@@ -321,16 +322,13 @@ impl Esc {
 
     /// Returns what the tasks demand of the drive.
     fn demands(&self) -> TaskDemands {
-        let powers_up = self.check.powers_up();
         TaskDemands {
-            note: self.tunes.note().filter(|_| !powers_up),
-            test: self
-                .check
-                .pull()
-                .map(Setpoint::Pull)
-                .or_else(|| self.identification()),
+            wanted: (self.check.pull().map(Setpoint::Pull))
+                .or_else(|| self.identification())
+                .map(Use::Measure)
+                .or_else(|| self.tunes.note().map(Use::Note)),
             too_hot: self.too_hot,
-            barred: powers_up
+            barred: self.check.powers_up()
                 || self.storage.is_lost()
                 || !self.check.report.may_turn(&self.params),
         }

@@ -1,14 +1,23 @@
-//! Maps the motor command to the drive's set-point.
+//! Maps what is granted to the drive's set-point.
 
 use crate::drive::Setpoint;
 use crate::drive::config::tone;
-use crate::input::authority::Command;
+use crate::input::authority::{Command, Demanded, Granted};
 use crate::input::{Share, reverse};
 use crate::math::{Held, Real, TopProduct};
 use crate::params::choice::CtlMode;
 use crate::params::{self, FromMotor, ParamId, Params};
 use crate::tune::Note;
 use crate::units::{Current, Scale, Speed};
+
+/// What the tasks may use the motor's phases for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Use {
+    /// A note of a tune.
+    Note(Note),
+    /// A set-point of a self-test or an identification.
+    Measure(Setpoint),
+}
 
 /// How throttle maps to a set-point (`CTL_MODE`).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +59,7 @@ impl Mapping {
     }
 
     /// Returns the set-point of a note, octaves lower if the control period is too long for its pitch.
-    pub fn tone(&self, note: Note) -> Setpoint {
+    fn tone(&self, note: Note) -> Setpoint {
         let Note::Pitch { hz } = note else {
             return Setpoint::Tone(Speed::ZERO);
         };
@@ -61,8 +70,16 @@ impl Mapping {
         Setpoint::Tone(pitch)
     }
 
-    /// Returns the set-point of a command.
-    pub fn setpoint(&self, command: Command) -> Setpoint {
+    /// Returns the set-point of what is granted.
+    pub fn setpoint(&self, granted: Granted<Use>) -> Setpoint {
+        match granted.demanded() {
+            Demanded::Command(command) => self.commanded(command),
+            Demanded::Use(Use::Note(note)) => self.tone(note),
+            Demanded::Use(Use::Measure(setpoint)) => setpoint,
+        }
+    }
+
+    fn commanded(&self, command: Command) -> Setpoint {
         match (command, self.mode) {
             (Command::Stop, _) => Setpoint::Stop,
             (Command::Zero, _) => Setpoint::Zero,
@@ -113,7 +130,7 @@ mod tests {
 
     fn rpm(throttle: f64) -> f32 {
         let (mapping, scale) = mapping(0.0);
-        match mapping.setpoint(Command::Throttle(Share::saturating_from_num(throttle))) {
+        match mapping.commanded(Command::Throttle(Share::saturating_from_num(throttle))) {
             Setpoint::Speed(speed) => scale.rpm(speed),
             other => panic!("{other:?}"),
         }
@@ -130,11 +147,11 @@ mod tests {
     fn torque_mode_and_tests_are_shares_of_the_bound() {
         let (mapping, scale) = mapping(1.0);
         let half = Share::from_num(0.5);
-        let Setpoint::Torque(current) = mapping.setpoint(Command::Throttle(half)) else {
+        let Setpoint::Torque(current) = mapping.commanded(Command::Throttle(half)) else {
             panic!("torque mode");
         };
         assert!((scale.amperes(current) - 10.0).abs() < 0.001);
-        let Setpoint::Test(current) = mapping.setpoint(Command::Test(half)) else {
+        let Setpoint::Test(current) = mapping.commanded(Command::Test(half)) else {
             panic!("a test");
         };
         assert!((scale.amperes(current) - 2.0).abs() < 0.001);
@@ -144,9 +161,9 @@ mod tests {
     fn voltage_mode_is_a_share_of_the_modulation() {
         let (mapping, _) = mapping(2.0);
         for share in [0.0, 0.3, 1.0].map(Share::saturating_from_num) {
-            let forward = mapping.setpoint(Command::Throttle(share));
+            let forward = mapping.commanded(Command::Throttle(share));
             assert_eq!(forward, Setpoint::Voltage(share));
-            let back = mapping.setpoint(Command::Throttle(reverse(share)));
+            let back = mapping.commanded(Command::Throttle(reverse(share)));
             assert_eq!(back, Setpoint::Voltage(-share));
         }
     }
@@ -156,8 +173,8 @@ mod tests {
         for mode in [0.0, 1.0] {
             let (mapping, _) = mapping(mode);
             for share in [0.0, 0.01, 0.5, 1.0].map(Share::saturating_from_num) {
-                let forward = mapping.setpoint(Command::Throttle(share));
-                let back = mapping.setpoint(Command::Throttle(reverse(share)));
+                let forward = mapping.commanded(Command::Throttle(share));
+                let back = mapping.commanded(Command::Throttle(reverse(share)));
                 match (forward, back) {
                     (Setpoint::Speed(a), Setpoint::Speed(b)) => assert_eq!(a, -b),
                     (Setpoint::Torque(a), Setpoint::Torque(b)) => assert_eq!(a, -b),
@@ -210,7 +227,7 @@ mod tests {
     #[test]
     fn stop_is_stop_and_zero_is_zero() {
         let (mapping, _) = mapping(0.0);
-        assert_eq!(mapping.setpoint(Command::Stop), Setpoint::Stop);
-        assert_eq!(mapping.setpoint(Command::Zero), Setpoint::Zero);
+        assert_eq!(mapping.commanded(Command::Stop), Setpoint::Stop);
+        assert_eq!(mapping.commanded(Command::Zero), Setpoint::Zero);
     }
 }

@@ -18,9 +18,8 @@ use crate::input::line::Event;
 use crate::input::signal::Signal;
 use crate::input::{Heard, Input, News};
 use crate::params::{self, Board, Params, scale};
-use crate::setpoint::Mapping;
+use crate::setpoint::{Mapping, Use};
 use crate::telemetry::Telemetry;
-use crate::tune::Note;
 use crate::units::Scale;
 
 /// How long the tasks' demands on the drive hold, µs: tasks poll every millisecond, and a dead one must not
@@ -52,10 +51,8 @@ pub struct Throttle {
 /// What the tasks demand at each poll.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct TaskDemands {
-    /// The note due, played while nothing turns the motor.
-    pub(crate) note: Option<Note>,
-    /// The set-point of a self-test or an identification, in place of notes.
-    pub(crate) test: Option<Setpoint>,
+    /// What is to energise the motor while nothing turns it.
+    pub(crate) wanted: Option<Use>,
     /// The temperature is over its limit.
     pub(crate) too_hot: bool,
     /// Nothing may turn the motor.
@@ -201,12 +198,11 @@ impl Throttle {
         if self.storing {
             return Setpoint::Stop;
         }
-        let command = self.command();
-        match (self.demands.test, self.demands.note) {
-            (Some(test), _) if command.rests() && self.now_us < self.demands_until_us => test,
-            (None, Some(note)) if command.rests() => self.mapping.tone(note),
-            _ => self.mapping.setpoint(command),
-        }
+        let wanted = match self.demands.wanted {
+            Some(Use::Measure(_)) if self.now_us >= self.demands_until_us => None,
+            wanted => wanted,
+        };
+        self.mapping.setpoint(self.input.authority().grant(wanted))
     }
 
     /// Returns the motor's command from the wire or a test.
@@ -345,5 +341,9 @@ impl<R: LockThrottle> Access for LockedAuthority<'_, R> {
 
     fn may_test(&mut self, now_us: u64, drive: DriveStatus) -> bool {
         self.authority(|authority| authority.may_test(now_us, drive))
+    }
+
+    fn barred(&mut self) -> bool {
+        self.authority(|authority| authority.barred())
     }
 }

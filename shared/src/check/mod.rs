@@ -147,6 +147,8 @@ pub struct Check {
     /// Sums of the current readings, and of their squares, A and A².
     sums: [f32; 3],
     squares: [f32; 3],
+    /// What the board itself measures has been measured since power-up.
+    has_looked: bool,
     /// Results so far.
     pub report: Report,
 }
@@ -159,6 +161,7 @@ impl Check {
             polls: 0,
             sums: [0.0; 3],
             squares: [0.0; 3],
+            has_looked: false,
             report: Report::new(board.current_range_a, board.current_a_per_count),
         }
     }
@@ -169,10 +172,10 @@ impl Check {
         self.go(Step::Listen);
     }
 
-    /// Returns true until the power-up measurements are made; before that no tune starts and nothing turns the
-    /// motor.
+    /// Returns true until what the board itself measures has been measured once, at power-up or by a test that came
+    /// first; before that nothing energises the motor.
     pub fn powers_up(&self) -> bool {
-        self.step == Step::PowerUp
+        !self.has_looked
     }
 
     /// Returns the pull to ask of the drive while nothing turns the motor.
@@ -300,7 +303,12 @@ impl Check {
     }
 
     fn end(&mut self, params: &Params, whole: bool) -> Outcome {
-        self.go(Step::Over);
+        // One that came before power-up's own measurements, and was broken off, leaves them to be made.
+        self.go(if self.has_looked {
+            Step::Over
+        } else {
+            Step::PowerUp
+        });
         Outcome::Done {
             passed: whole && self.report.fits(params),
         }
@@ -318,6 +326,7 @@ impl Check {
                 Own::Value(value) => self.report.set(item.kind, item.phase, value),
             }
         }
+        self.has_looked = true;
         true
     }
 

@@ -20,13 +20,14 @@ const STEPS: [(u8, &str); 6] = [
 
 impl Esc {
     /// Starts an identification requested by the stick, under the same conditions as a command; its result is
-    /// kept. After a loss of settings it refuses, since the defaults would be stored with the result.
+    /// kept.
     pub(super) fn identify_by_stick(&mut self, throttle: &mut impl LockThrottle, now_us: u64) {
         let drive = self.drive();
-        if !self.storage.is_lost() && LockedAuthority(throttle).may_test(now_us, drive) {
+        let mut authority = LockedAuthority(throttle);
+        if !authority.barred() && authority.may_test(now_us, drive) {
             self.identify(now_us, true);
         } else {
-            self.warn_of("Not identified: a fault, or settings lost");
+            self.warn_of("Not identified: a fault, defect or settings lost");
         }
     }
 

@@ -33,6 +33,9 @@ pub trait Access {
 
     /// See [`Authority::may_test`].
     fn may_test(&mut self, now_us: u64, drive: DriveStatus) -> bool;
+
+    /// See [`Authority::barred`].
+    fn barred(&mut self) -> bool;
 }
 
 impl Access for Authority {
@@ -64,5 +67,9 @@ impl Access for Authority {
 
     fn may_test(&mut self, now_us: u64, drive: DriveStatus) -> bool {
         Authority::may_test(self, now_us, drive)
+    }
+
+    fn barred(&mut self) -> bool {
+        Authority::barred(self)
     }
 }

@@ -1,6 +1,6 @@
-//! Decides whether the motor may turn: only an armed wire or a time-limited test turns it. The one exception is
-//! an identification, which starts under the same rule as a test, and only while nothing here demands anything
-//! (`Throttle::setpoint`).
+//! Decides whether the motor may be energised: only an armed wire or a time-limited test turns it. What the tasks want
+//! of its phases besides, an identification, a self-test's pulse or a note, is granted only while nothing here demands
+//! anything and nothing bars the motor.
 //!
 //! Zero throttle, held for a set time in an identified signal, arms the wire. Losing that signal disarms it,
 //! and an unarmed wire never turns the motor. Only a frame with a correct checksum, or a pulse, changes the
@@ -65,6 +65,26 @@ impl Command {
     pub fn rests(self) -> bool {
         matches!(self, Self::Stop | Self::Zero)
     }
+}
+
+/// What may energise the motor's phases: only [`Authority::grant`] makes one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Granted<T>(Demanded<T>);
+
+impl<T> Granted<T> {
+    /// Returns what is granted.
+    pub fn demanded(self) -> Demanded<T> {
+        self.0
+    }
+}
+
+/// What is demanded of the drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Demanded<T> {
+    /// By the wire or a motor test; rest, if by nobody.
+    Command(Command),
+    /// By the tasks.
+    Use(T),
 }
 
 /// The drive's state, for tests that need the motor at rest.
@@ -412,8 +432,24 @@ impl Authority {
         Ok(())
     }
 
-    /// Returns true if something other than the wire may use the motor: it is at rest without a fault, and the
-    /// wire is silent or at valid zero. This holds even when barred, so that a self-test can find out why.
+    /// Returns what may energise the motor now, of the command and of what the tasks want besides.
+    #[inline(always)] // one caller, at each frame
+    pub fn grant<T>(&self, wanted: Option<T>) -> Granted<T> {
+        let command = self.command();
+        Granted(match wanted {
+            Some(wanted) if command.rests() && !self.barred => Demanded::Use(wanted),
+            _ => Demanded::Command(command),
+        })
+    }
+
+    /// Returns true if nothing may energise the motor.
+    pub fn barred(&self) -> bool {
+        self.barred
+    }
+
+    /// Returns true if a test or a measurement may begin: the motor is at rest without a fault, and the wire is silent
+    /// or at valid zero. This holds even when barred, so that a self-test can find out why: then it measures what
+    /// needs no current.
     pub fn may_test(&self, now_us: u64, drive: DriveStatus) -> bool {
         let silent = !within(now_us, self.event_us, self.timing.loss_us);
         drive.stopped && !drive.faulted && (silent || self.holds_zero(now_us))

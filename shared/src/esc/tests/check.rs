@@ -28,9 +28,16 @@ impl Probe for Plain {
     }
 }
 
-/// A board whose first comparator never trips, and whose bridge conducts for some looks.
+/// A board whose first comparator never trips, or is sound, and whose bridge conducts for some looks.
 struct Bad {
     busy: u32,
+    sound: bool,
+}
+
+impl Bad {
+    fn new(busy: u32) -> Self {
+        Self { busy, sound: false }
+    }
 }
 
 impl Probe for Bad {
@@ -44,7 +51,7 @@ impl Probe for Bad {
             return Own::Busy;
         }
         match (item.kind, item.phase) {
-            (Kind::Comparator, 0) => Own::Value(f32::NAN),
+            (Kind::Comparator, 0) if !self.sound => Own::Value(f32::NAN),
             (Kind::Comparator, _) => Own::Value(0.0),
             _ => Own::Absent,
         }
@@ -64,7 +71,7 @@ impl Bench {
 #[test]
 fn a_self_test_lifts_no_bar_before_it_has_measured() {
     let mut bench = Bench::at_power_up();
-    let mut probe = Bad { busy: 0 };
+    let mut probe = Bad::new(0);
     bench.test_itself_ms(&mut probe, 1_500);
     assert!(!bench.esc.telemetry().armed, "barred since power-up");
     bench.results.clear();
@@ -84,13 +91,23 @@ fn a_self_test_lifts_no_bar_before_it_has_measured() {
 #[test]
 fn what_the_board_measures_waits_for_a_bridge_that_is_off() {
     let mut bench = Bench::at_power_up();
-    let mut probe = Bad { busy: 50 };
+    let mut probe = Bad::new(50);
     let misfit = |bench: &Bench| bench.texts.iter().any(|text| text.contains("comparator_a"));
     let sounds = |bench: &Bench| matches!(bench.throttle.setpoint(), Setpoint::Tone { .. });
     bench.test_itself_ms(&mut probe, 50);
     assert!(probe.busy > 0 && !misfit(&bench) && !sounds(&bench));
     bench.test_itself_ms(&mut probe, 20);
-    assert!(probe.busy == 0 && misfit(&bench) && sounds(&bench));
+    assert!(probe.busy == 0 && misfit(&bench) && !sounds(&bench));
+
+    let mut bench = Bench::at_power_up();
+    let mut probe = Bad {
+        busy: 50,
+        sound: true,
+    };
+    bench.test_itself_ms(&mut probe, 50);
+    assert!(probe.busy > 0 && !sounds(&bench));
+    bench.test_itself_ms(&mut probe, 20);
+    assert!(probe.busy == 0 && sounds(&bench));
     bench.command(MavCmd::MAV_CMD_RUN_PREARM_CHECKS, 0.0);
     probe.busy = 50;
     bench.test_itself_ms(&mut probe, 100);
@@ -136,4 +153,60 @@ fn nothing_arms_before_the_tasks_have_run() {
     }
     assert!(throttle.signal().is_some(), "it has been heard");
     assert_eq!(throttle.command(), Command::Stop);
+}
+
+/// Whatever bars the motor, nothing energises its phases, whoever asks.
+#[test]
+fn a_barred_motor_is_not_energised() {
+    let lost = |bench: &mut Bench| bench.esc.lose_stored();
+    let unmeasured = |_: &mut Bench| {};
+    let defect = |bench: &mut Bench| bench.test_itself_ms(&mut Bad::new(0), 10);
+    let bars: [(&str, bool, &dyn Fn(&mut Bench)); 3] = [
+        ("settings lost", true, &lost),
+        ("not measured yet", false, &unmeasured),
+        ("a defect", false, &defect),
+    ];
+    let identify: &dyn Fn(&mut Bench) = &|bench| bench.command(MavCmd::MAV_CMD_USER_1, 1.0);
+    let asked = |bench: &mut Bench| bench.set("MOT_IDENTIFY", 1.0);
+    let by_stick = |bench: &mut Bench| {
+        bench
+            .esc
+            .identify_by_stick(&mut bench.throttle, bench.now_us);
+    };
+    let test = |bench: &mut Bench| bench.command(MavCmd::MAV_CMD_ACTUATOR_TEST, 0.1);
+    let check = |bench: &mut Bench| bench.command(MavCmd::MAV_CMD_RUN_PREARM_CHECKS, 0.0);
+    let beep = |bench: &mut Bench| bench.frames(10, 1);
+    let throttle = |bench: &mut Bench| bench.frames(20, 1000);
+    let uses: [(&str, &dyn Fn(&mut Bench)); 7] = [
+        ("identification", identify),
+        ("MOT_IDENTIFY", &asked),
+        ("identification by the stick", &by_stick),
+        ("motor test", &test),
+        ("self-test", &check),
+        ("note", &beep),
+        ("throttle", &throttle),
+    ];
+    for (why, measured, bar) in bars {
+        for (what, ask) in uses {
+            let mut bench = Bench::at_power_up();
+            if measured {
+                bench.test_itself_ms(&mut Plain, 10);
+            }
+            bar(&mut bench);
+            bench.frames(500, 0);
+            ask(&mut bench);
+            for _ in 0..1_500 {
+                if what != "throttle" {
+                    bench.frames(1, 0);
+                }
+                bench.poll();
+                if why != "not measured yet" {
+                    bench.esc.test_itself(&bench.snapshot, &mut Bad::new(0));
+                }
+                let setpoint = bench.throttle.setpoint();
+                let rests = matches!(setpoint, Setpoint::Stop | Setpoint::Zero);
+                assert!(rests, "{why}, {what}: {setpoint:?}");
+            }
+        }
+    }
 }

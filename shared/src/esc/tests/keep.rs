@@ -18,7 +18,7 @@ mod wear;
 const INTERVAL: MavCmd = MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL;
 
 impl Bench {
-    fn set(&mut self, name: &str, value: f32) {
+    pub(super) fn set(&mut self, name: &str, value: f32) {
         let mut id = [0; 16];
         id[..name.len()].copy_from_slice(name.as_bytes());
         self.message(&PARAM_SET_DATA {

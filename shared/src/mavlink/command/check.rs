@@ -27,9 +27,16 @@ impl Commands {
             Some(2) => Act::KeepIdentified,
             _ => return DENIED,
         };
-        let result = self.measure(command, act, drive, context);
+        let barred = act == Act::Identify && context.authority.barred();
+        let result = if barred {
+            TEMPORARILY_REJECTED
+        } else {
+            self.measure(command, act, drive, context)
+        };
         if result == TEMPORARILY_REJECTED {
-            let reason = if drive.faulted {
+            let reason = if barred {
+                "settings are lost, or a defect"
+            } else if drive.faulted {
                 "a fault holds"
             } else if !drive.stopped {
                 "the motor turns"
