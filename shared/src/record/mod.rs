@@ -70,6 +70,8 @@ pub struct Record {
     rested: AtomicU32,
     /// Faults counted by the drive since this start.
     counted: AtomicU32,
+    /// Nonzero from the period of a fault until its row is complete.
+    begun: AtomicU32,
     /// Nonzero once someone has read the held periods.
     taken: AtomicU32,
 }
@@ -82,6 +84,7 @@ impl Record {
             periods: [const { [const { AtomicU32::new(0) }; ROW] }; PERIODS],
             rested: AtomicU32::new(0),
             counted: AtomicU32::new(0),
+            begun: AtomicU32::new(0),
             taken: AtomicU32::new(0),
         }
     }
@@ -98,6 +101,7 @@ impl Record {
         }
         self.put(place::STARTS, self.get(place::STARTS).wrapping_add(1));
         self.counted.store(0, Relaxed);
+        self.begun.store(0, Relaxed);
         self.rested.store(self.get(place::WRITTEN), Relaxed);
     }
 
@@ -145,22 +149,24 @@ impl Record {
             Bridge::Off | Bridge::Charge(_) => [NO_DUTY; 3],
         };
         if matches!(bridge, Bridge::Off) {
-            let tripped = self.counted.load(Relaxed) != state.last_fault().count;
-            if tripped && free && written != self.rested.load(Relaxed) {
-                // The period of a trip is long: the fault itself waits for the next one.
-                self.put(place::PERIOD_S, config.scale.period_s.to_bits());
-                self.put(place::HOLDER, self.get(place::NOTED) + 1);
-                self.taken.store(0, Relaxed);
-                self.write(written, state, sample, duties);
-                let held = next(written) | HELD;
-                self.put(place::WRITTEN, held);
-                self.rested.store(held, Relaxed);
-                return;
+            if self.begun.load(Relaxed) != 0 {
+                self.complete_fault(config, state, sample, period);
+            } else if self.counted.load(Relaxed) != state.last_fault().count {
+                self.begin_fault(state);
+                if free && written != self.rested.load(Relaxed) {
+                    // The period of a trip is long: the rest of the fault's row waits for the next one.
+                    self.put(place::PERIOD_S, config.scale.period_s.to_bits());
+                    self.put(place::HOLDER, self.get(place::NOTED) + 1);
+                    self.taken.store(0, Relaxed);
+                    self.write(written, state, sample, duties);
+                    let held = next(written) | HELD;
+                    self.put(place::WRITTEN, held);
+                    self.rested.store(held, Relaxed);
+                    return;
+                }
+                self.complete_fault(config, state, sample, period);
             }
             self.rested.store(written, Relaxed);
-            if tripped {
-                self.note_fault(config, state, sample, period);
-            }
         } else if free {
             self.write(written, state, sample, duties);
             self.put(place::WRITTEN, next(written));
@@ -171,20 +177,30 @@ impl Record {
         }
     }
 
-    /// Records the last fault.
-    fn note_fault(&self, config: &Config, state: &State, sample: &Sample, period: u32) {
+    /// Records which fault is the last, and in which phase: another may follow in the next period.
+    fn begin_fault(&self, state: &State) {
         let last = state.last_fault();
         self.counted.store(last.count, Relaxed);
-        let noted = self.get(place::NOTED);
         let what = last.fault as u32 | (last.phase as u32) << 8;
+        self.put(self.fault_row(), what | self.get(place::STARTS) << 16);
+        self.begun.store(1, Relaxed);
+    }
+
+    /// Records when it was, and what the supply and the rotor did.
+    fn complete_fault(&self, config: &Config, state: &State, sample: &Sample, period: u32) {
+        let at = self.fault_row();
         let (_, speed) = state.rotor();
-        let at = place::FAULTS + ROW * (noted as usize % FAULTS);
-        self.put(at, what | self.get(place::STARTS) << 16);
-        self.put(at + 1, period);
         let speed = speed.to_bits() as u32;
+        self.put(at + 1, period);
         self.put(at + 2, halves(speed, counts(sample.bus)));
         self.put(at + 3, config.scale.period_s.to_bits());
-        self.put(place::NOTED, noted + 1);
+        self.put(place::NOTED, self.get(place::NOTED) + 1);
+        self.begun.store(0, Relaxed);
+    }
+
+    /// Returns where the next fault's row is.
+    fn fault_row(&self) -> usize {
+        place::FAULTS + ROW * (self.get(place::NOTED) as usize % FAULTS)
     }
 
     /// Notes that someone has read the held periods: the next driven ones may replace them.

@@ -80,7 +80,7 @@ impl Bench {
             Setpoint::Fault(fault),
         );
         assert_eq!(bridge, Bridge::Off);
-        // The fault is recorded in the first period or in the second.
+        // The row of a trip is complete in the second period.
         self.run(2, bridge);
     }
 
@@ -231,4 +231,25 @@ fn after_hours_of_driving_each_period_still_has_its_time() {
         let ago = (n as f32 - PERIODS as f32) * period_s;
         assert!((period.time_s - ago).abs() < 1e-9, "{n}");
     }
+}
+
+/// A break right after a trip: the first is the one that holds the periods.
+#[test]
+fn two_faults_in_succession_are_two_rows() {
+    let mut bench = Bench::new();
+    bench.drive(100);
+    for fault in [Fault::Overrun, Fault::OverCurrent] {
+        let sample = Bench::sample(0);
+        let bridge = step(
+            &bench.config,
+            &mut bench.state,
+            sample,
+            Setpoint::Fault(fault),
+        );
+        bench.run(1, bridge);
+    }
+    bench.run(10, Bridge::Off);
+    let read = bench.read();
+    assert_eq!(kinds(&read), [(1, Fault::Overrun), (2, Fault::OverCurrent)]);
+    assert_eq!(read.holder, Some(1));
 }
