@@ -57,9 +57,14 @@ impl State {
         self.catch.is_compare_due()
     }
 
-    /// Returns true if this period only checks a tracked rotor's fit.
+    /// Returns true if this period is to check a tracked rotor's fit, and no more.
     pub(super) fn does_little(&self) -> bool {
         self.catch.is_check_due()
+    }
+
+    /// Returns true if the firmware's own work fits behind what this period has done.
+    pub(super) fn has_done_little(&self) -> bool {
+        self.catch.has_corrected()
     }
 
     /// Forgets the rotor: the terminals have been driven since.

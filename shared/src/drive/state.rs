@@ -144,6 +144,12 @@ impl State {
         None
     }
 
+    /// Returns true until the present phase, one of rest, has begun in full.
+    #[inline(always)] // in each period
+    pub(super) fn begins_rest(&self) -> bool {
+        self.enters_rest != 0
+    }
+
     fn forget_drives(&mut self) {
         self.foc.rest();
         self.six_step.rest();
@@ -189,7 +195,7 @@ impl State {
             }
             (Why::Resumed, None) => foc::begin::resume(config, &mut self.foc, &self.shared),
             (Why::Resumed | Why::Released, Some(_)) if to.drives() => {
-                six_step::period::resume(&mut self.six_step);
+                six_step::period::resume(&mut self.six_step, &self.shared);
             }
             _ => {}
         }
@@ -283,7 +289,7 @@ impl State {
                 match self.phase {
                     Phase::Tone => false,
                     phase if phase.drives() => self.six_step.has_done_little(),
-                    phase => !phase.is_off() || self.off.does_little(),
+                    phase => !phase.is_off() || self.off.has_done_little(),
                 }
             }
     }

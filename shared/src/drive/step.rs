@@ -110,8 +110,8 @@ fn other_modes(config: &Config, state: &mut State, sample: &Sample, setpoint: &S
 /// - A drive at rest is asked for nothing, which also clears the count of failed starts.
 /// - A drive in Sense is still asked to turn.
 /// - The six-step drive decides by itself, but for faults.
-/// - In Idle this period compares a turning rotor with its prediction, the longest of four; a request waits for the
-///   next.
+/// - In Idle this period compares a turning rotor with its prediction, the longest of four, or a drive that has just ended
+///   is not forgotten yet; a request waits for the next.
 #[inline(always)] // in each period
 fn mode_stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     match (state.phase, setpoint) {
@@ -123,10 +123,9 @@ fn mode_stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
             }
             nothing
         }
-        (Phase::Idle, _) => state.off.is_compare_due(),
-        (phase, sought) if phase.drives() => {
-            config.six_step.is_some() && !matches!(sought, Setpoint::Fault(_))
-        }
+        (_, Setpoint::Fault(_)) => false,
+        (Phase::Idle, _) => state.off.is_compare_due() || state.begins_rest(),
+        (phase, _) if phase.drives() => config.six_step.is_some(),
         (Phase::Sense, Setpoint::Speed(_)) => {
             config.six_step.is_none() && setpoint.rotation(config.both_ways) != Rotation::Rest
         }

@@ -137,6 +137,12 @@ impl State {
         self.stage == Stage::CheckFit
     }
 
+    /// Returns true if the last period has corrected a turning rotor's motion by a look: with a snapshot of the state that
+    /// takes no longer than a comparison.
+    pub fn has_corrected(&self) -> bool {
+        self.stage == Stage::CheckFit
+    }
+
     /// Returns true if looks use the mean of four readings.
     pub(super) fn is_slow(&self) -> bool {
         self.omega.saturating_abs() < SLOW

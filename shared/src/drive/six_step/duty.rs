@@ -2,7 +2,7 @@
 
 use fixed::types::I1F31;
 
-use super::state::State;
+use super::state::{Piece, State};
 use crate::control::planner;
 use crate::control::six_step::commutation::Legs;
 use crate::control::six_step::duty;
@@ -156,12 +156,13 @@ pub(super) fn hold(six_step: &Config, s: &mut State, i: Current, wanted: Current
     duty::share(&mut s.duty, range.greatest, range);
 }
 
-/// Starts speed regulation from the present speed and duty.
-pub(super) fn take_over(s: &mut State) {
+/// Starts speed regulation from the present speed and duty. Until the next demand these bounds hold.
+pub(super) fn take_over(s: &mut State, bounds: Bounds) {
     s.planner = planner::State::begin(s.tracking.omega_bar);
     duty::take_over(&mut s.duty);
     s.wanted = s.duty.duty;
-    s.plan_next();
+    s.bounds = bounds;
+    s.ask(Piece::Demand);
 }
 
 /// Returns the bridge in the present sextant.

@@ -49,7 +49,7 @@ pub(super) fn begin(
     let share = emf.top(supply.reciprocal).top(BETWEEN_PHASES).to_bits();
     let duty = I1F31::from_bits(share.min((1 << 22) - 1) << 9);
     s.duty.duty = duty.min(six_step.duty.duty_max);
-    take_over(s);
+    take_over(s, shared.protection.bounds);
 }
 
 /// Follows the position: selects the sextant for the middle of the time in which the command acts,

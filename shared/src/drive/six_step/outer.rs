@@ -1,6 +1,6 @@
 //! The pieces of the outer loop, each in a period of its own.
 
-use super::state::{State, slot};
+use super::state::{Piece, State};
 use super::{duty, telemetry};
 use crate::drive::config;
 use crate::drive::config::six_step::Config;
@@ -10,7 +10,7 @@ use crate::drive::shared::Shared;
 use crate::drive::transitions::Why;
 use crate::units::{AdcCounts, Current};
 
-/// Runs the piece that is due; returns the mode change that the set-point asks for.
+/// Runs the piece that is due, if any; returns the mode change that the set-point asks for.
 pub(super) fn run(
     config: &config::Config,
     six_step: &Config,
@@ -19,14 +19,15 @@ pub(super) fn run(
     readings: ([AdcCounts; 3], Current),
 ) -> Option<Why> {
     let phase = shared.seen.phase;
-    match s.take_due() {
-        slot::MODE => return mode_change(config, shared, phase, setpoint),
-        slot::DEMAND if phase == Phase::Run || phase == Phase::Stopping => {
-            duty::plan(config, six_step, (s, shared), setpoint);
+    match s.take_due()? {
+        Piece::Mode => return mode_change(config, shared, phase, setpoint),
+        Piece::Demand => {
+            if matches!(phase, Phase::Run | Phase::Stopping) {
+                duty::plan(config, six_step, (s, shared), setpoint);
+            }
         }
-        slot::SEEN => telemetry::see(s, shared, readings),
-        slot::SUPPLY => telemetry::supply(config, s, shared, readings.1),
-        _ => {}
+        Piece::Seen => telemetry::see(s, shared, readings),
+        Piece::Supply => telemetry::supply(config, s, shared, readings.1),
     }
     None
 }

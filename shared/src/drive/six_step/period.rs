@@ -36,8 +36,8 @@ pub(in crate::drive) fn is_too_fast(
 }
 
 /// Resumes Run from the present speed and duty.
-pub(in crate::drive) fn resume(s: &mut State) {
-    take_over(s);
+pub(in crate::drive) fn resume(s: &mut State, shared: &Shared) {
+    take_over(s, shared.protection.bounds);
 }
 
 /// Begins a start.
@@ -119,7 +119,7 @@ pub(in crate::drive) fn period(
         hold(six_step, s, i, ramp_current);
         if s.tracking.crossings >= KNOWN && s.tracking.omega_bar >= six_step.run_speed {
             s.tracking.acceleration = Speed::ZERO;
-            take_over(s);
+            take_over(s, shared.protection.bounds);
             (shown, why) = (Phase::Run, Some(Why::HandedOver));
         }
     } else {
@@ -131,7 +131,7 @@ pub(in crate::drive) fn period(
         }
     }
     telemetry::update(config, (s, shared), shown, currents);
-    if why.is_none() && s.is_due() {
+    if why.is_none() {
         why = outer::run(config, six_step, (s, shared), setpoint, (currents, i));
     }
     (bridge(s, swapped, None), why)

@@ -97,11 +97,9 @@ pub(super) fn park(
     telemetry::update(config, (s, shared), phase, currents);
     let why = if is_aligned {
         Some(Why::Aligned)
-    } else if s.is_due() {
+    } else {
         let readings = (currents, switching);
         outer::run(config, six_step, (s, shared), setpoint, readings)
-    } else {
-        None
     };
     (bridge(s, swapped, floating), why)
 }

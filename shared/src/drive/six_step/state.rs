@@ -10,19 +10,22 @@ use crate::control::speed::Bounds;
 use crate::trace::traced;
 use crate::units::Current;
 
-/// The periods, of [`PERIODS`], in which pieces of the outer loop are due. Every second one has none: a piece waits there for
-/// the end of what a crossing or a commutation takes.
-pub(super) mod slot {
-    /// The mode, from the set-point.
-    pub(in crate::drive::six_step) const MODE: u8 = 0;
+/// The pieces of the outer loop. In [`PERIODS`] each falls due once, in every second period; it waits for the end of what a
+/// crossing, a commutation or a piece before it takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Piece {
     /// From the set-point to the wanted duty and the current's bounds.
-    pub(in crate::drive::six_step) const DEMAND: u8 = 2;
+    Demand,
     /// Currents and voltages for telemetry.
-    pub(in crate::drive::six_step) const SEEN: u8 = 4;
+    Seen,
     /// Bounds from the supply's current.
-    pub(in crate::drive::six_step) const SUPPLY: u8 = 6;
-    /// One without a piece.
-    pub(in crate::drive::six_step) const NOTHING: u8 = 1;
+    Supply,
+    /// The mode, from the set-point.
+    Mode,
+}
+
+impl Piece {
+    const ALL: [Self; PERIODS as usize / 2] = [Self::Demand, Self::Seen, Self::Supply, Self::Mode];
 }
 
 /// Park first holds the rotor along phase c, at 240°.
@@ -42,9 +45,9 @@ traced! {
         pub(super) bounds: Bounds,
         /// The period's place among [`PERIODS`].
         pub(super) slot: u8,
-        /// The last slot whose piece waits.
+        /// The pieces that are due, a bit each.
         pub(super) due: u8,
-        /// A crossing was found in this period, or it ended a sextant.
+        /// In this period a crossing was found, a sextant ended, or a piece was run.
         pub(super) is_busy: bool,
         /// ∫i dt at the present angle of Park.
         pub(super) charge: I36F28,
@@ -72,8 +75,8 @@ impl Default for State {
             duty: duty::State::default(),
             wanted: I1F31::ZERO,
             bounds: Bounds::default(),
-            slot: slot::NOTHING,
-            due: slot::NOTHING,
+            slot: 0,
+            due: 0,
             is_busy: false,
             charge: I36F28::ZERO,
             swing: Current::ZERO,
@@ -87,33 +90,34 @@ impl Default for State {
 }
 
 impl State {
-    /// Begins a period: takes the next slot.
+    /// Begins a period.
     pub(super) fn next(&mut self) {
         self.slot = (self.slot + 1) % PERIODS as u8;
         if self.slot.is_multiple_of(2) {
-            self.due = self.slot;
+            self.due |= 1 << (self.slot / 2);
         }
         self.is_busy = false;
     }
 
-    /// Makes the outer loop begin in the next period.
-    pub(super) fn plan_next(&mut self) {
-        self.slot = slot::DEMAND - 1;
+    /// Makes a piece due in the next period.
+    pub(super) fn ask(&mut self, piece: Piece) {
+        self.due |= 1 << piece as u8;
     }
 
-    /// Returns true if a piece is due now.
-    pub(super) fn is_due(&self) -> bool {
-        self.due != slot::NOTHING && !self.is_busy
-    }
-
-    /// Returns the slot whose piece is due.
-    pub(super) fn take_due(&mut self) -> u8 {
-        core::mem::replace(&mut self.due, slot::NOTHING)
+    /// Returns the piece to run in this period, if any.
+    pub(super) fn take_due(&mut self) -> Option<Piece> {
+        if self.is_busy {
+            return None;
+        }
+        let piece = *Piece::ALL.get(self.due.trailing_zeros() as usize)?;
+        self.due &= self.due - 1;
+        self.is_busy = true;
+        Some(piece)
     }
 
     /// Returns true if the last period had nothing to do but to look for a crossing and to bound the current.
     pub(in crate::drive) fn has_done_little(&self) -> bool {
-        !self.slot.is_multiple_of(2) && !self.is_busy
+        !self.is_busy
     }
 
     /// Ends a drive.
