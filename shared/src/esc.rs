@@ -258,7 +258,20 @@ impl Esc {
         self.component.warn(warning);
     }
 
-    fn warn_of(&mut self, trouble: &str) {
+    /// Likewise of one that is in pieces; what does not fit is cut.
+    pub fn warn_in_pieces(&mut self, what: &str, why: [&str; 3]) {
+        let mut text = Warning::new();
+        let _ = text.push_str(what);
+        for piece in why {
+            // Cut what does not fit: `push_str` would drop it as a whole.
+            let room = text.capacity() - text.len();
+            let _ = text.push_str(piece.get(..room).unwrap_or(piece));
+        }
+        self.warn(text);
+    }
+
+    /// Likewise of a text.
+    pub fn warn_of(&mut self, trouble: &str) {
         let mut warning = Warning::new();
         // A longer one would be cut on MAVLink anyway.
         let _ = warning.push_str(trouble);
@@ -363,7 +376,7 @@ impl Esc {
             }
             Some(Request::FactoryReset) => {
                 let mut defaults = Params::default();
-                defaults.fit(&self.board);
+                while defaults.fit(&self.board).is_some() {}
                 match self.overrides.check(&defaults, &self.board) {
                     Ok(()) => self.storage.ask(request),
                     Err(error) => self.component.storage_done(Err(error.reason)),

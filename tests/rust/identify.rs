@@ -295,7 +295,7 @@ fn a_reason_that_is_too_long_for_a_text_is_cut_and_not_left_out() {
     let mut station = bench(of_the_library("gimbal"), &fast);
     assert_eq!(identify(&mut station), MavResult::MAV_RESULT_FAILED);
     let last = station.texts.last().expect("the reason");
-    assert_eq!(last, "Not identified: too high for this flux and LIM_BUS");
+    assert_eq!(last, "Not identified: too high for flux and LIM_BUS_V_MAX");
 }
 
 #[test]

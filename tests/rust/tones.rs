@@ -1,13 +1,23 @@
 //! Tunes on the benches: audible, with bounded current, on a motor that does not turn.
 
 use siskin_control::drive::{Phase, Setpoint};
+use siskin_control::input::authority::{Authority, Timing};
 use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
-use siskin_control::setpoint::Mapping;
+use siskin_control::setpoint::{Mapping, Use};
 use siskin_control::tune::{Beacon, Note, Player, Tune};
 use siskin_emulator::device::{Device, Start};
 use siskin_emulator::plant::Fidelity;
 use siskin_emulator::rig::{Bench, Period, Rig};
 use siskin_emulator::scenario::{Standing, stand};
+
+/// Returns the set-point of a note that nothing bars.
+fn granted(mapping: &Mapping, note: Note) -> Setpoint {
+    let timing = Timing {
+        arm_us: 300_000,
+        loss_us: 100_000,
+    };
+    mapping.setpoint(Authority::new(timing).grant(Some(Use::Note(note))))
+}
 
 const BENCHES: [&str; 4] = ["bosso", "quad-5-inch", "quad-10-inch", "scooter"];
 
@@ -131,13 +141,13 @@ impl Stage {
         player.play(self.now_us(), tune);
         self.run(time_s, |now_us, mapping| {
             let note = player.note(now_us);
-            note.map_or(Setpoint::Stop, |note| mapping.tone(note))
+            note.map_or(Setpoint::Stop, |note| granted(mapping, note))
         })
     }
 
     /// Plays a pitch for some time.
     fn hum(&mut self, hz: u16, time_s: f64) -> Seen {
-        self.run(time_s, |_, mapping| mapping.tone(Note::Pitch { hz }))
+        self.run(time_s, |_, mapping| granted(mapping, Note::Pitch { hz }))
     }
 }
 

@@ -4,7 +4,7 @@ use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
 use siskin_control::drive::Sample;
 use siskin_control::image::Image;
-use siskin_control::params::{Board, LeastDeadTime};
+use siskin_control::params::{Board, Greatest, LeastDeadTime};
 use siskin_control::units::AdcCounts;
 
 use super::Noise;
@@ -82,6 +82,8 @@ impl Sensing {
             bus_v_per_count: (VOLTAGE_RANGE_V / VOLTAGE_COUNTS) as f32,
             terminal_v_per_count: (VOLTAGE_RANGE_V / VOLTAGE_COUNTS) as f32,
             current_range_a: self.range_a as f32,
+            greatest_phase: Board::greatest_phase(self.range_a as f32),
+            greatest_supply: Greatest::ANY,
             shunts: Shunts::Three,
             delay,
             low_side_on_s: 1e-6,

@@ -2,7 +2,7 @@
 
 use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
-use siskin_control::params::{Board, LeastDeadTime, ParamId, PwmBound};
+use siskin_control::params::{Board, Greatest, LeastDeadTime, ParamId, PwmBound};
 use siskin_control::parts;
 use siskin_control::protection::Ntc;
 
@@ -61,7 +61,7 @@ const SIX_STEP_BOUND: PwmBound = PwmBound {
 };
 
 /// Those of an image with parts of the papers.
-const PWM_BOUNDS: [PwmBound; 6] = [
+const PWM_BOUNDS: [PwmBound; 5] = [
     PwmBound {
         choice: (ParamId::CtlObserver, 1.0),
         hz: 30_000.0,
@@ -76,11 +76,6 @@ const PWM_BOUNDS: [PwmBound; 6] = [
         choice: (ParamId::CtlObserver, 0.0),
         hz: 36_000.0,
         refusal: "at most 36000 with CTL_OBSERVER 0",
-    },
-    PwmBound {
-        choice: (ParamId::CtlRegulator, 0.0),
-        hz: 36_000.0,
-        refusal: "at most 36000 with CTL_REGULATOR 0",
     },
     SIX_STEP_BOUND,
     PwmBound {
@@ -98,6 +93,15 @@ pub const BOARD: Board = Board {
     terminal_v_per_count: V_PER_COUNT / TERMINAL_DIVIDER,
     shunts: Shunts::Three,
     current_range_a: RATING_A,
+    greatest_phase: Greatest {
+        value: 27.7,
+        refusal: "above this board's 27.7 A",
+    },
+    // The converter ends at 34.27 V, and the board is for 6S.
+    greatest_supply: Greatest {
+        value: 33.0,
+        refusal: "above this board's 33 V",
+    },
     // Duties computed in one period apply from the next counter top on.
     delay: Delay::One,
     // The first sampling window is centred on the counter's top, so half of it (0.15 µs) and 1 µs of amplifier
@@ -142,6 +146,28 @@ mod tests {
             // After the parameter's name in a text of 50 bytes.
             assert!("PWM_DEADTIME_NS: ".len() + least.refusal.len() <= 50);
         }
+    }
+
+    #[test]
+    fn limits_are_within_what_the_converters_show_and_named() {
+        for board in [BOARD, super::super::vesc4_f405::BOARD] {
+            let shown_a = Board::greatest_phase(board.current_range_a).value;
+            let limits = [
+                (board.greatest_phase, shown_a, "A"),
+                (
+                    board.greatest_supply,
+                    0.97 * 4095.0 * board.bus_v_per_count,
+                    "V",
+                ),
+            ];
+            for (greatest, shown, unit) in limits {
+                assert!(greatest.value <= shown && greatest.value > 0.9 * shown);
+                let number = format!(" {} {unit}", greatest.value);
+                assert!(greatest.refusal.ends_with(&number));
+            }
+        }
+        // The guide has the first one.
+        assert!(GUIDE.contains(&format!("up to {} A peak", BOARD.greatest_phase.value)));
     }
 
     #[test]

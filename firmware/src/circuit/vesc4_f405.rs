@@ -2,7 +2,7 @@
 
 use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
-use siskin_control::params::{Board, LeastDeadTime};
+use siskin_control::params::{Board, Greatest, LeastDeadTime};
 use siskin_control::protection::Ntc;
 
 use crate::image;
@@ -34,6 +34,15 @@ pub const BOARD: Board = Board {
     shunts: Shunts::Two,
     // The converter's range is ±165 A about mid-scale.
     current_range_a: 120.0,
+    greatest_phase: Greatest {
+        value: 83.1,
+        refusal: "above this board's 83.1 A",
+    },
+    // As in the VESC firmware for this class; the converter ends at 61.8 V, and the DRV8302 is for 60 V.
+    greatest_supply: Greatest {
+        value: 57.0,
+        refusal: "above this board's 57 V",
+    },
     // Duties computed in one period apply from the next counter top on.
     delay: Delay::One,
     // Half of the sampling window, 0.36 µs, and 1.5 µs of amplifier settling before the top.

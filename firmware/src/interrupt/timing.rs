@@ -53,7 +53,9 @@ mod tests {
     use super::*;
     use siskin_control::control::delay::Delay;
     use siskin_control::control::sensing::Shunts;
-    use siskin_control::params::{BOSSO_BENCH, Board, LeastDeadTime, ParamId, Params, build};
+    use siskin_control::params::{
+        BOSSO_BENCH, Board, Greatest, LeastDeadTime, ParamId, Params, build,
+    };
 
     /// Any board.
     const BOARD: Board = Board {
@@ -67,6 +69,8 @@ mod tests {
         low_side_on_s: 2e-6,
         refresh_s: 3e-6,
         charge_s: 60e-6,
+        greatest_phase: Greatest::ANY,
+        greatest_supply: Greatest::ANY,
         least_dead_time: LeastDeadTime::NONE,
         pwm_bounds: &[],
     };

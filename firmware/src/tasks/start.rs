@@ -4,7 +4,7 @@ use embassy_executor::Spawner;
 use embassy_stm32::uid::uid;
 use siskin_control::esc::{Esc, check};
 use siskin_control::image::Image;
-use siskin_control::mavlink::{Receiver, Warning};
+use siskin_control::mavlink::Receiver;
 use siskin_control::params::choice::CtlObserver;
 use siskin_control::params::{Board, ParamId, Params};
 use siskin_control::record;
@@ -23,7 +23,6 @@ use crate::board::wire::TICK_HZ;
 use crate::board::{BOARD, Bridge, Converters, Hardware};
 use crate::exchange::{InterruptEnd, SnapshotReader};
 use crate::storage::{Storage, range};
-use crate::text::push;
 use crate::{exchange, interrupt, last_words};
 
 /// Set-point age at which the interrupt stops obeying it: ten missed renewals.
@@ -98,14 +97,11 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
 
 /// How well the stored parameters fit the board.
 #[derive(Default)]
-pub enum Fit {
-    /// They fit.
-    #[default]
-    Whole,
-    /// They fit with a change of this parameter for this reason.
-    Changed(ParamId, &'static str),
-    /// They do not fit.
-    Refused,
+pub struct Fit {
+    /// The last one that was brought within its bounds, and why.
+    changed: Option<(ParamId, &'static str)>,
+    /// The one for which the defaults are in force, and why.
+    refused: Option<(ParamId, &'static str)>,
 }
 
 /// Creates the ESC with the stored parameters or, if they do not fit the board, with the defaults. The store is
@@ -118,13 +114,13 @@ pub enum Fit {
 pub fn power_up(flash: &mut Storage, fit: &mut Fit) -> Esc {
     let board = board();
     let mut params = stored_params(flash);
-    if let Some((id, reason)) = params.fit(&board) {
-        *fit = Fit::Changed(id, reason);
+    while let Some(change) = params.fit(&board) {
+        fit.changed = Some(change);
     }
-    if check(&params, &board).is_err() {
-        *fit = Fit::Refused;
+    if let Err(error) = check(&params, &board) {
+        fit.refused = Some((error.param, error.reason));
         params = Params::default();
-        params.fit(&board);
+        while params.fit(&board).is_some() {}
         check(&params, &board).expect("the defaults fit every board");
     }
     let bytes_per_s = params.get(ParamId::TelBaud) as u32 / 10;
@@ -134,21 +130,15 @@ pub fn power_up(flash: &mut Storage, fit: &mut Fit) -> Esc {
 /// Makes the ESC report what became of the stored parameters.
 #[inline(never)] // its stack is free for what comes next
 fn tell(esc: &mut Esc, fit: Fit) {
-    let mut warning = Warning::new();
-    match fit {
-        Fit::Whole => return,
-        Fit::Changed(id, reason) => {
-            push(&mut warning, id.entry().name);
-            push(&mut warning, ": ");
-            push(&mut warning, reason);
-        }
-        Fit::Refused => {
-            esc.lose_stored();
-            let text = "Parameters do not fit the board: using defaults";
-            push(&mut warning, text);
-        }
+    if fit.refused.is_some() {
+        esc.lose_stored();
     }
-    esc.warn(warning);
+    if let Some((id, reason)) = fit.refused.or(fit.changed) {
+        esc.warn_in_pieces(id.entry().name, [": ", reason, ""]);
+    }
+    if fit.refused.is_some() {
+        esc.warn_of("Parameters do not fit the board: using defaults");
+    }
 }
 
 /// Returns this board, with its serial number.

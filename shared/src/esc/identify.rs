@@ -4,7 +4,6 @@ use super::{Esc, check};
 use crate::drive::{Setpoint, Snapshot};
 use crate::identify::{Inputs, Outcome};
 use crate::input::access::Access;
-use crate::mavlink::Warning;
 use crate::params::ParamId;
 use crate::throttle::{LockThrottle, LockedAuthority};
 
@@ -105,6 +104,7 @@ impl Esc {
                 return;
             };
             self.identify.end(error.reason);
+            self.warn_in_pieces(error.param.entry().name, [": ", error.reason, ""]);
             outcome = Outcome::Done(Err(error.reason));
         }
         match outcome {
@@ -124,16 +124,5 @@ impl Esc {
                 self.component.check_done(result.is_ok());
             }
         }
-    }
-
-    fn warn_in_pieces(&mut self, what: &str, why: [&str; 3]) {
-        let mut text = Warning::new();
-        let _ = text.push_str(what);
-        for piece in why {
-            // Cut what does not fit: `push_str` would drop it as a whole.
-            let room = text.capacity() - text.len();
-            let _ = text.push_str(piece.get(..room).unwrap_or(piece));
-        }
-        self.warn(text);
     }
 }

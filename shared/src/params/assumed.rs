@@ -115,6 +115,7 @@ mod tests {
     fn without_a_motor_every_supply_limit_and_pwm_makes_a_six_step_drive() {
         let board = Board {
             current_range_a: 300.0,
+            greatest_phase: Board::greatest_phase(300.0),
             ..Board::BENCH
         };
         for supply_v in [5.0, 12.6, 60.0] {

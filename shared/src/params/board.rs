@@ -4,7 +4,6 @@ use crate::control::delay::Delay;
 use crate::control::sensing::Shunts;
 use crate::image::Image;
 use crate::params::table::ParamId;
-use crate::params::values::Params;
 
 /// The board's properties that the control must know.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,6 +16,10 @@ pub struct Board {
     pub bus_v_per_count: f32,
     /// Greatest phase current that the converter can read, peak amperes.
     pub current_range_a: f32,
+    /// Upper bound of `LIM_PHASE_A`: its trip is within what the converter shows and what the board is rated for.
+    pub greatest_phase: Greatest,
+    /// Upper bound of `LIM_BUS_V_MAX`: what the board is rated for, within what the converter shows.
+    pub greatest_supply: Greatest,
     /// Volts per count of the terminals' converter, of 4096 counts.
     pub terminal_v_per_count: f32,
     /// Which phases have a current shunt.
@@ -48,6 +51,23 @@ pub struct PwmBound {
     pub refusal: &'static str,
 }
 
+/// The highest limit that a board can keep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Greatest {
+    /// In the limit's unit.
+    pub value: f32,
+    /// Why a higher one is refused, with its number.
+    pub refusal: &'static str,
+}
+
+impl Greatest {
+    /// The table's range is no wider.
+    pub const ANY: Self = Self {
+        value: f32::INFINITY,
+        refusal: "",
+    };
+}
+
 /// The shortest dead time that a board's drivers and transistors tolerate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeastDeadTime {
@@ -65,18 +85,19 @@ impl LeastDeadTime {
     };
 }
 
+/// Software trip over `LIM_PHASE_A`.
+pub(crate) const TRIP_SHARE: f32 = 1.4;
+
+/// Greatest trip over the converter's range; the rest is for offsets and the uneven ends of the range.
+const SHOWN_SHARE: f32 = 0.97;
+
 impl Board {
-    /// Returns the bound of `PWM_FREQ_HZ` for the choices in force, if there is one.
-    pub(super) fn pwm_bound(&self, params: &Params) -> Option<&'static PwmBound> {
-        let six_step = params.drives_by_six_step();
-        self.pwm_bounds.iter().find(|bound| {
-            let (id, value) = bound.choice;
-            match id {
-                ParamId::CtlDrive => six_step,
-                // A choice that this build lacks is kept, and another is in force.
-                _ => !six_step && params.get(id) == value && !id.lacks(value),
-            }
-        })
+    /// Returns the upper bound of `LIM_PHASE_A` for sensors of this range, without its number.
+    pub const fn greatest_phase(range_a: f32) -> Greatest {
+        Greatest {
+            value: SHOWN_SHARE / TRIP_SHARE * range_a,
+            refusal: "its trip is beyond the current sensors' range",
+        }
     }
 
     /// The sensors of the emulator's bench: 12 bits over ±40 A and 70 V.
@@ -85,6 +106,8 @@ impl Board {
         current_a_per_count: 40.0 / 2048.0,
         bus_v_per_count: 70.0 / 4096.0,
         current_range_a: 40.0,
+        greatest_phase: Self::greatest_phase(40.0),
+        greatest_supply: Greatest::ANY,
         terminal_v_per_count: 70.0 / 4096.0,
         shunts: Shunts::Three,
         delay: Delay::One,

@@ -123,33 +123,6 @@ impl Params {
         self.get(id) == id.default_value()
     }
 
-    /// Raises a dead time below the board's least, which the table's default may be, and lowers a PWM frequency above the
-    /// bound of what is in force. Returns one of them that was chosen, not the default, and why it is changed.
-    pub fn fit(&mut self, board: &Board) -> Option<(ParamId, &'static str)> {
-        let mut told = None;
-        let least = board.least_dead_time;
-        if self.get(ParamId::PwmDeadtimeNs) < least.ns {
-            told = self.refit(ParamId::PwmDeadtimeNs, least.ns, least.refusal);
-        }
-        if let Some(bound) = board.pwm_bound(self)
-            && self.get(ParamId::PwmFreqHz) > bound.hz
-        {
-            told = self.refit(ParamId::PwmFreqHz, bound.hz, bound.refusal);
-        }
-        told
-    }
-
-    fn refit(
-        &mut self,
-        id: ParamId,
-        value: f32,
-        reason: &'static str,
-    ) -> Option<(ParamId, &'static str)> {
-        let chosen = !self.is_default(id);
-        self.values[id as usize] = value;
-        chosen.then_some((id, reason))
-    }
-
     /// Sets a value that may be outside the table's range; nothing is derived from it.
     pub(super) fn assume(&mut self, id: ParamId, value: f32) {
         self.values[id as usize] = value;

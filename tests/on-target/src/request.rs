@@ -5,7 +5,7 @@ use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
 use siskin_control::drive::{Excitation, Fault, Pull, Sample, Setpoint};
 use siskin_control::image::Image;
-use siskin_control::params::{BOSSO_BENCH, Board, LeastDeadTime, ParamId, Params, TABLE};
+use siskin_control::params::{BOSSO_BENCH, Board, Greatest, LeastDeadTime, ParamId, Params, TABLE};
 use siskin_control::units::{AdcCounts, Current, Speed};
 
 /// Words of the parameters and the board.
@@ -31,6 +31,8 @@ pub fn set_up(params: &Params, board: &Board) -> [u32; SET_UP_WORDS] {
         refresh_s,
         charge_s,
         // The requester has built it before.
+        greatest_phase: _,
+        greatest_supply: _,
         least_dead_time: _,
         pwm_bounds: _,
     } = *board;
@@ -74,6 +76,8 @@ pub fn read_set_up(words: &[u32; SET_UP_WORDS]) -> (Params, Board) {
             Shunts::Three
         },
         delay: Delay::One,
+        greatest_phase: Greatest::ANY,
+        greatest_supply: Greatest::ANY,
         least_dead_time: LeastDeadTime::NONE,
         pwm_bounds: &[],
     };

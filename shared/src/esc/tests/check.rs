@@ -161,12 +161,13 @@ fn a_barred_motor_is_not_energised() {
     let lost = |bench: &mut Bench| bench.esc.lose_stored();
     let unmeasured = |_: &mut Bench| {};
     let defect = |bench: &mut Bench| bench.test_itself_ms(&mut Bad::new(0), 10);
-    let bars: [(&str, bool, &dyn Fn(&mut Bench)); 3] = [
+    type Act<'a> = &'a dyn Fn(&mut Bench);
+    let bars: [(&str, bool, Act); 3] = [
         ("settings lost", true, &lost),
         ("not measured yet", false, &unmeasured),
         ("a defect", false, &defect),
     ];
-    let identify: &dyn Fn(&mut Bench) = &|bench| bench.command(MavCmd::MAV_CMD_USER_1, 1.0);
+    let identify = |bench: &mut Bench| bench.command(MavCmd::MAV_CMD_USER_1, 1.0);
     let asked = |bench: &mut Bench| bench.set("MOT_IDENTIFY", 1.0);
     let by_stick = |bench: &mut Bench| {
         bench
@@ -177,8 +178,8 @@ fn a_barred_motor_is_not_energised() {
     let check = |bench: &mut Bench| bench.command(MavCmd::MAV_CMD_RUN_PREARM_CHECKS, 0.0);
     let beep = |bench: &mut Bench| bench.frames(10, 1);
     let throttle = |bench: &mut Bench| bench.frames(20, 1000);
-    let uses: [(&str, &dyn Fn(&mut Bench)); 7] = [
-        ("identification", identify),
+    let uses: [(&str, Act); 7] = [
+        ("identification", &identify),
         ("MOT_IDENTIFY", &asked),
         ("identification by the stick", &by_stick),
         ("motor test", &test),

@@ -89,10 +89,7 @@ fn a_dead_time_below_the_boards_is_refused() {
 #[test]
 fn a_stored_dead_time_below_the_boards_is_raised() {
     let mut board = Board::new(&image(), &[(ParamId::PwmDeadtimeNs, 300.0)]);
-    board.hear(
-        "PWM_DEADTIME_NS below this board's 750 ns, raised",
-        500 * MS,
-    );
+    board.hear("PWM_DEADTIME_NS: below this board's 750 ns", 500 * MS);
     let (value, _) = board.param("PWM_DEADTIME_NS", 100 * MS).expect("an answer");
     assert_eq!(value, 750.0);
 }
