@@ -344,6 +344,6 @@ impl<R: LockThrottle> Access for LockedAuthority<'_, R> {
     }
 
     fn barred(&mut self) -> bool {
-        self.authority(|authority| authority.barred())
+        self.authority(Access::barred)
     }
 }

@@ -36,7 +36,7 @@ class Board:
 
 BOARDS = {
     "b-g431b-esc1": Board(
-        # All but the store. The target is 96 KB, next to a resident loader.
+        # All but the store.
         flash=Region("flash", 0x0800_0000, 128 * KB, 124 * KB),
         memories=(
             # With the fault record, which the image for flying keeps.

@@ -113,6 +113,11 @@ impl Load {
         }
     }
 
+    /// Returns how often it has taken more than this many cycles.
+    pub fn longer_than(&self, cycles: Cycles) -> u64 {
+        self.took.range(cycles + 1..).map(|(_, times)| times).sum()
+    }
+
     fn median(&self) -> Cycles {
         let mut seen = 0;
         let mut took = self.took.iter();
