@@ -141,12 +141,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_part_s_token_is_there_where_the_part_is() {
-        assert_eq!(BackEmf::get().is_some(), Part::BackEmf.is_here());
-        assert_eq!(Drift::get().is_some(), Part::Drift.is_here());
-    }
-
-    #[test]
     fn each_part_but_the_bench_s_belongs_to_one_image() {
         for part in Part::ALL {
             let images = [FLIGHT, PAPERS];

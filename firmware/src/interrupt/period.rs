@@ -102,7 +102,7 @@ impl Interrupt {
     }
 
     /// Handles any other period.
-    #[inline(never)] // only some periods
+    #[inline(never)] // the tests count its instructions
     fn control(&mut self) {
         self.pwm.commutate();
         self.end.listen();

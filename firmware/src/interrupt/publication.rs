@@ -3,7 +3,7 @@
 /// How often a task looks, Hz: it finds a new one each time.
 const LOOKS_HZ: f32 = 1000.0;
 
-/// Counts the periods between two snapshots. Copying one takes some 100 instructions: it waits for a period in which the
+/// Counts the periods between two snapshots. Copying one takes 133 instructions: it waits for a period in which the
 /// control has little to do, but no longer than until a task looks.
 pub(crate) struct Publication {
     /// Periods until one is wanted; from zero down, it is.

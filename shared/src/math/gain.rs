@@ -70,7 +70,7 @@ impl<A: Number, B: Number> Gain<A, B> {
     }
 
     /// Returns the product with `x`, saturated.
-    #[inline]
+    #[inline] // where that is short: a call each costs the longest period 10 instructions, a copy each the flash 0.5 KB
     pub fn held(self, x: A) -> B {
         B::from_bits(self.factor.saturating(x.to_bits()))
     }

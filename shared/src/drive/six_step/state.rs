@@ -127,3 +127,25 @@ impl State {
         self.planner = planner::State::default();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// At four periods per sextant a crossing and a commutation may be in succession, always in the same slots.
+    #[test]
+    fn each_piece_has_its_turn_at_four_periods_per_sextant() {
+        for first in 0..4 {
+            let mut state = State::default();
+            let mut turns = [0; Piece::ALL.len()];
+            for period in 0..80 * PERIODS {
+                state.next();
+                state.is_busy = (period + first) % 4 < 2;
+                if let Some(piece) = state.take_due() {
+                    turns[piece as usize] += 1;
+                }
+            }
+            assert!(turns.iter().all(|turns| *turns >= 79), "{first}: {turns:?}");
+        }
+    }
+}
