@@ -24,15 +24,14 @@ OPEN = {
     # A phase is known to be open once the rotor has been seen everywhere over some turns. Where two phases do not turn
     # the motor that far, the six-step drive's duty rises until the current trips.
     **cells([SIX], ["phase_open"], ["start"], "current", "cause", "time"),
-    **cells([SIX], ["phase_open"], ["half"], "current"),
-    **cells([SIX], ["phase_open"], ["full", "braking"], "current", "cause"),
+    **cells([SIX], ["phase_open"], ["half", "full"], "current", "cause"),
     **cells([SIX], ["high_open", "low_open"], ["start"], "current", "cause"),
     # The six-step drive keeps its full speed without this switch, within its current, and does not say so.
-    **cells([SIX], ["high_open"], ["full"], "cause", "time"),
+    **cells([SIX], ["high_open"], ["full"], "time"),
     # With a switch that never turns on, the torque that low speed allows, a drop as large as the back-EMF, takes the
-    # others' currents up to 1.3 A above 1.2 times the limit in a start, and 0.3 A in braking. With half of that torque
-    # it is met, and thrust comes later.
-    **cells([FOC], ["high_open"], ["start", "braking"], "current"),
+    # others' currents up to 1.4 A above 1.2 times the limit in a start. With half of that torque it is met, and thrust
+    # comes later.
+    **cells([FOC], ["low_open"], ["start"], "current"),
     **cells([SIX], ["low_open"], ["braking"], "current", "cause"),
     # At idle little more flows than a sound sensor may be off by. The six-step drive's start meets a sensor that shows
     # nothing with more current.
@@ -45,7 +44,9 @@ OPEN = {
     # from its flux after 0.1 s, if no current trips.
     **cells([FOC], ["rotor_blocked"], ["idle"], "time"),
     **cells([FOC], ["rotor_blocked"], ["half"], "current", "time"),
-    **cells([SIX], ["rotor_blocked"], ["half"], "reaction"),
+    # The six-step drive meets the jam with 2.8 A above 1.2 times the limit at half speed, and is 2 ms late at idle.
+    **cells([SIX], ["rotor_blocked"], ["half"], "current"),
+    **cells([SIX], ["rotor_blocked"], ["idle"], "time"),
     **cells([SIX], ["rotor_blocked"], ["start"], "cause", "reaction", "time"),
     **cells([FOC], ["rotor_blocked"], ["braking"], "current"),
     # Nearly all of the back-EMF vanishes faster than the currents are regulated.
@@ -55,7 +56,10 @@ OPEN = {
     **cells([SIX], ["strike_torque"], ["start"], "reaction"),
     # 10 A into 470 µF is 0.9 V per period. Braking backs off ahead of the limit, but the currents lag behind a supply that
     # rises so fast, and what they still return takes it a tenth of a volt beyond the limit.
-    **cells([FOC], ["disconnect"], ["braking"], "supply"),
+    **cells([FOC, SIX], ["disconnect"], ["braking"], "supply"),
+    # What is left in the capacitors at full speed is gone within a few periods, and with it the voltage that holds the
+    # current: 1.1 A above the bound.
+    **cells([FOC], ["disconnect"], ["full"], "current"),
     # In its start the six-step drive shoots a short through the winding, up to the comparators' level.
     **cells([SIX], ["high_short"], ["start"], "current"),
 }

@@ -294,8 +294,12 @@ fn a_reason_that_is_too_long_for_a_text_is_cut_and_not_left_out() {
     let fast = [(ParamId::PwmFreqHz, 24_000.0)];
     let mut station = bench(of_the_library("gimbal"), &fast);
     assert_eq!(identify(&mut station), MavResult::MAV_RESULT_FAILED);
-    let last = station.texts.last().expect("the reason");
-    assert_eq!(last, "Not identified: too high for flux and LIM_BUS_V_MAX");
+    let [.., of_parameter, last] = &station.texts[..] else {
+        panic!("{:?}", station.texts);
+    };
+    assert_eq!(last, "Not identified: too high for flux and LIM_BUS_V_MA");
+    let whole = "PWM_FREQ_HZ: too high for flux and LIM_BUS_V_MAX";
+    assert_eq!(of_parameter, whole);
 }
 
 #[test]
