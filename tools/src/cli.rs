@@ -152,9 +152,9 @@ pub(crate) enum ParamsCommand {
         #[arg(required_unless_present = "all", value_name = "NAME")]
         names: Vec<String>,
     },
-    /// Change parameters; they last until power-off unless stored.
+    /// Change parameters; the ESC stores them by itself within seconds.
     Set {
-        /// Store all parameters in the ESC afterwards.
+        /// Store them now, and wait until they would survive a loss of power.
         #[arg(long)]
         store: bool,
         /// Alternating names, in any case, and values, for example LIM_PHASE_A 15 MOT_STOP 0.
