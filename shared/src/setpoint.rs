@@ -71,11 +71,11 @@ impl Mapping {
     }
 
     /// Returns the set-point of what is granted.
-    pub fn setpoint(&self, granted: Granted<Use>) -> Setpoint {
+    pub fn setpoint(&self, granted: Granted<&Use>) -> Setpoint {
         match granted.demanded() {
             Demanded::Command(command) => self.commanded(command),
-            Demanded::Use(Use::Note(note)) => self.tone(note),
-            Demanded::Use(Use::Measure(setpoint)) => setpoint,
+            Demanded::Use(Use::Note(note)) => self.tone(*note),
+            Demanded::Use(Use::Measure(setpoint)) => *setpoint,
         }
     }
 

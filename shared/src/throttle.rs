@@ -198,9 +198,9 @@ impl Throttle {
         if self.storing {
             return Setpoint::Stop;
         }
-        let wanted = match self.demands.wanted {
+        let wanted = match &self.demands.wanted {
             Some(Use::Measure(_)) if self.now_us >= self.demands_until_us => None,
-            wanted => wanted,
+            wanted => wanted.as_ref(),
         };
         self.mapping.setpoint(self.input.authority().grant(wanted))
     }

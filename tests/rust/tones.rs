@@ -16,7 +16,7 @@ fn granted(mapping: &Mapping, note: Note) -> Setpoint {
         arm_us: 300_000,
         loss_us: 100_000,
     };
-    mapping.setpoint(Authority::new(timing).grant(Some(Use::Note(note))))
+    mapping.setpoint(Authority::new(timing).grant(Some(&Use::Note(note))))
 }
 
 const BENCHES: [&str; 4] = ["bosso", "quad-5-inch", "quad-10-inch", "scooter"];
