@@ -262,19 +262,15 @@ const COSTLY: [Setting; 3] = [
 const SPEED: Setting = (ParamId::CtlSpeed, 1.0);
 const SINE: Setting = (ParamId::CtlModulation, 1.0);
 
-/// All choices that only the image with the papers has, alone and with what costs most besides; and its six-step drive.
-const PAPERS: [(Setting, &[Setting]); 12] = [
+/// All choices that only the image with the papers has, with what costs most besides; and its six-step drive.
+const PAPERS: [(Setting, &[Setting]); 8] = [
     ((ParamId::CtlObserver, 0.0), &[(ParamId::CtlRegulator, 0.0)]),
     ((ParamId::CtlObserver, 0.0), &[]),
-    ((ParamId::CtlObserver, 1.0), &[]),
-    ((ParamId::CtlObserver, 2.0), &[]),
     ((ParamId::CtlObserver, 1.0), &COSTLY),
     ((ParamId::CtlObserver, 2.0), &COSTLY),
     ((ParamId::CtlRegulator, 0.0), &[SPEED, SINE]),
     ((ParamId::CtlRegulator, 2.0), &[SPEED, SINE]),
-    (SINE, &[]),
     ((ParamId::CtlAdaptL, 1.0), &[SPEED, SINE]),
-    (SPEED, &[]),
     (SIX_STEP, &[SLOW]),
 ];
 
