@@ -26,7 +26,7 @@ impl Esc {
         if !authority.barred() && authority.may_test(now_us, drive) {
             self.identify(now_us, true);
         } else {
-            self.warn_of("Not identified: a fault, defect or settings lost");
+            self.warn_of("Not identified: fault, defect, settings lost");
         }
     }
 

@@ -35,7 +35,7 @@ impl Commands {
         };
         if result == TEMPORARILY_REJECTED {
             let reason = if barred {
-                "settings lost, or a defect"
+                "settings lost, a defect"
             } else if drive.faulted {
                 "a fault holds"
             } else if !drive.stopped {
