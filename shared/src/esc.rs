@@ -376,7 +376,7 @@ impl Esc {
             }
             Some(Request::FactoryReset) => {
                 let mut defaults = Params::default();
-                while defaults.fit(&self.board).is_some() {}
+                defaults.fit(&self.board);
                 match self.overrides.check(&defaults, &self.board) {
                     Ok(()) => self.storage.ask(request),
                     Err(error) => self.component.storage_done(Err(error.reason)),

@@ -114,13 +114,11 @@ pub struct Fit {
 pub fn power_up(flash: &mut Storage, fit: &mut Fit) -> Esc {
     let board = board();
     let mut params = stored_params(flash);
-    while let Some(change) = params.fit(&board) {
-        fit.changed = Some(change);
-    }
+    fit.changed = params.fit(&board);
     if let Err(error) = check(&params, &board) {
         fit.refused = Some((error.param, error.reason));
         params = Params::default();
-        while params.fit(&board).is_some() {}
+        params.fit(&board);
         check(&params, &board).expect("the defaults fit every board");
     }
     let bytes_per_s = params.get(ParamId::TelBaud) as u32 / 10;

@@ -76,7 +76,7 @@ impl Esc {
         throttle: &mut impl LockThrottle,
         kept: &mut Kept,
     ) -> Result<(), BuildError> {
-        while kept.params.fit(&self.board).is_some() {}
+        kept.params.fit(&self.board);
         self.overrides.check(&kept.params, &self.board)?;
         self.params = kept.params.clone();
         self.component.keep_intervals(&kept.intervals);

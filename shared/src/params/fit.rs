@@ -5,17 +5,16 @@ use super::table::ParamId;
 use super::values::Params;
 
 impl Params {
-    /// Brings one value within the board's bounds that somebody has chosen, and all defaults before it: a dead time below
-    /// the least, a supply's limit above the greatest, a PWM frequency above the bound of what is in force. Returns which, and
-    /// why; `None` if all fit. Call it until then.
+    /// Raises a dead time below the board's least, and lowers a supply's limit above its greatest and a PWM frequency above
+    /// the bound of what is in force. Returns the last of them that somebody has chosen, and why it is changed.
     pub fn fit(&mut self, board: &Board) -> Option<(ParamId, &'static str)> {
         let (least, supply) = (board.least_dead_time, board.greatest_supply);
-        self.hold(ParamId::PwmDeadtimeNs, (least.ns, f32::MAX), least.refusal)
-            .or_else(|| self.hold(ParamId::LimBusVMax, (0.0, supply.value), supply.refusal))
-            .or_else(|| {
-                let PwmBound { hz, refusal, .. } = *self.pwm_bound(board)?;
-                self.hold(ParamId::PwmFreqHz, (0.0, hz), refusal)
-            })
+        let dead_time = self.hold(ParamId::PwmDeadtimeNs, (least.ns, f32::MAX), least.refusal);
+        let supply = self.hold(ParamId::LimBusVMax, (0.0, supply.value), supply.refusal);
+        let pwm = self
+            .pwm_bound(board)
+            .and_then(|bound| self.hold(ParamId::PwmFreqHz, (0.0, bound.hz), bound.refusal));
+        pwm.or(supply).or(dead_time)
     }
 
     /// Holds a value within bounds; returns the reason if that changes one that somebody has chosen.

@@ -127,7 +127,7 @@ fn the_default_of_a_dead_time_is_the_boards() {
         ..Board::BENCH
     };
     let mut params = Params::default();
-    while params.fit(&board).is_some() {}
+    params.fit(&board);
     let id = ParamId::PwmDeadtimeNs;
     let place = id as usize;
     let path = format!("@PARAM/param.pck?withdefaults=1&start={place}&count=1");

@@ -57,7 +57,7 @@ impl Mirror {
     /// Creates the chip's with the first paper's motor and default parameters, before its first interrupt.
     pub(crate) fn new() -> Self {
         let mut params = Params::of(&BOSSO_MOTOR);
-        while params.fit(&BOARD).is_some() {}
+        params.fit(&BOARD);
         let config = build(&params, &BOARD).expect("the defaults fit the board");
         let period_s = config.scale.period_s;
         Self {
