@@ -7,7 +7,8 @@
 //! command. When nearly all other frames fail their check, as random words do, the valid ones do not count
 //! either: one random word in sixteen passes by chance. That judgement takes some twelve frames, so a wire at
 //! zero opens only after several throttle frames in a row. Of armed wires that turn to noise at zero, one in
-//! 2170 then turns the motor; opening on the first throttle frame would let 57 of 100 turn it.
+//! 2170 then turns the motor; opening on the first throttle frame would let 57 of 100 turn it. A pulse has no
+//! checksum; that it follows from the one before is its check.
 
 use super::Share;
 use super::command::within;
@@ -23,13 +24,12 @@ const ARMING_FRAMES: u32 = 30;
 /// The minimum number of zero-throttle pulses that arm a wire; a servo signal has 50 a second.
 const ARMING_PULSES: u32 = 5;
 
-/// DShot zeros, without throttle in between, that close an armed wire. In flight a zero may be another frame
-/// with errors that its checksum misses: it stops the motor until the next throttle frame.
-const CLOSING_FRAMES: u8 = 10;
-/// Consecutive DShot throttle frames, without a bad one in between, that reopen it. They delay the first by
-/// 0.75 ms at 4 kHz, 3 ms at 1 kHz. A pulse has no checksum to pass by chance and opens at once: edges that
-/// look like pulses do so repeatedly, and spikes never do.
-const OPENING_FRAMES: u8 = 4;
+/// Zeros, without throttle in between, that close an armed wire. In flight a zero may be another frame with errors
+/// that its checksum misses: it stops the motor until the next throttle frame. A wire is armed closed.
+const CLOSING: u8 = 10;
+/// Consecutive throttle frames, or steady pulses from the first on, without a bad one in between, that reopen it. They
+/// delay the first by 0.75 ms at 4 kHz, 3 ms at 1 kHz, 60 ms with a servo's 50 Hz.
+const OPENING: u8 = 4;
 
 /// The longest silence after a DShot command that is not a loss, µs. The protocol allows 260 ms after a beacon,
 /// and Betaflight's loop, which waits for it, sends the next frame 110 ms later.
@@ -216,6 +216,12 @@ impl Authority {
         if identified.is_some_and(|identified| identified != signal) {
             return self.count_failure();
         }
+        let steady = !matches!(event, Event::Pulse { steady: false, .. });
+        if steady {
+            self.trust.good();
+        } else {
+            self.trust.bad();
+        }
         match demand {
             Demand::Zero => {
                 self.closing = self.closing.saturating_add(1);
@@ -224,10 +230,11 @@ impl Authority {
             Demand::Throttle(_) => {
                 self.arming = None;
                 self.test = None;
-                self.opening = self.opening.saturating_add(1);
+                let row = if steady { self.opening } else { 0 };
+                self.opening = row.saturating_add(1);
             }
         }
-        if matches!(signal, Signal::Dshot { .. }) && !self.trust.good() {
+        if !self.trust.believes() {
             // It neither keeps the signal alive nor opens the throttle. Stopping is right either way, and it
             // ends the sender's silence after a command.
             if let Some(valid) = &mut self.valid {
@@ -241,7 +248,7 @@ impl Authority {
         if self.valid.is_some_and(|valid| valid.signal != signal) {
             self.restart();
         }
-        let demand = self.opened(signal, demand);
+        let demand = self.opened(demand);
         let valid = Valid {
             at_us: now_us,
             signal,
@@ -255,11 +262,10 @@ impl Authority {
         }
     }
 
-    /// Returns the demand to act on: an armed wire at zero holds it for the first throttle frames.
-    fn opened(&mut self, signal: Signal, demand: Demand) -> Demand {
-        let closed = self.armed && self.closing >= CLOSING_FRAMES;
-        let waits = closed && self.opening < OPENING_FRAMES;
-        if waits && matches!(signal, Signal::Dshot { .. }) {
+    /// Returns the demand to act on: an armed wire at zero holds it for the first throttle frames or pulses.
+    fn opened(&mut self, demand: Demand) -> Demand {
+        let closed = self.armed && self.closing >= CLOSING;
+        if closed && self.opening < OPENING {
             return Demand::Zero;
         }
         if demand != Demand::Zero {
@@ -284,6 +290,7 @@ impl Authority {
         if valid.identified && held {
             self.armed = true;
             self.arming = None;
+            self.closing = CLOSING;
         }
     }
 

@@ -35,7 +35,7 @@ impl Reading {
                 Kind::Throttle(throttle) => Demand::Throttle(throttle),
                 Kind::Stop | Kind::Command(_) => Demand::Zero,
             },
-            Event::Pulse { kind, width_ns } => {
+            Event::Pulse { kind, width_ns, .. } => {
                 self.ends.demand(kind, width_ns, self.two_directions)
             }
             Event::Bad => return None,

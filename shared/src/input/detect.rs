@@ -4,7 +4,7 @@
 //! the signal.
 
 use super::event::Event;
-use super::signal::{Pulse, Signal};
+use super::signal::Signal;
 
 /// Hits needed to accept a signal, along with the time below. At 50 Hz four pulses take 60 ms, and the first
 /// may come 20 ms late.
@@ -13,10 +13,6 @@ const HELD_MS: u32 = 50;
 
 /// The longest gap between two hits, ms.
 const GAP_MS: u32 = 100;
-
-/// The most two successive pulse widths may differ, as a divisor of the range: a stick going from end to end in
-/// 0.16 s at 50 Hz. Random edges differ by more.
-const STEADY_PART: u32 = 8;
 
 /// The candidates on one line.
 #[derive(Clone, Debug)]
@@ -34,8 +30,6 @@ struct Candidate {
     misses: u32,
     first_at: u32,
     last_at: u32,
-    /// Width of the last pulse, ns.
-    width_ns: u32,
 }
 
 impl Detector {
@@ -79,7 +73,7 @@ impl Detector {
             .filter(|frames| frames.lasts(at_ticks, gap_ticks))
         {
             if frames.signal == signal {
-                self.frames = Some(frames.hit(at_ticks, 0));
+                self.frames = Some(frames.hit(at_ticks));
                 return Some(event);
             }
             if let Some(frames) = frames.missed() {
@@ -87,23 +81,21 @@ impl Detector {
                 return Some(Event::Bad);
             }
         }
-        self.frames = Some(Candidate::new(signal, at_ticks, 0));
+        self.frames = Some(Candidate::new(signal, at_ticks));
         Some(event)
     }
 
     /// Weighs an event of the pulse decoder, and returns it if it should be passed on.
     pub(super) fn pulse(&mut self, at_ticks: u32, event: Event) -> Option<Event> {
         let before = self.pulses.take();
-        if let Event::Pulse { kind, width_ns } = event {
+        if let Event::Pulse { kind, steady, .. } = event {
             let signal = Signal::Pulse(kind);
             // Pulses have no checksum, so nothing may count against them.
             let same = before.filter(|pulses| {
-                pulses.signal == signal
-                    && pulses.lasts(at_ticks, self.gap_ticks)
-                    && is_steady(kind, pulses.width_ns, width_ns)
+                pulses.signal == signal && pulses.lasts(at_ticks, self.gap_ticks) && steady
             });
-            let candidate = same.map_or(Candidate::new(signal, at_ticks, width_ns), |pulses| {
-                pulses.hit(at_ticks, width_ns)
+            let candidate = same.map_or(Candidate::new(signal, at_ticks), |pulses| {
+                pulses.hit(at_ticks)
             });
             self.pulses = Some(candidate);
         } else if before.is_none() {
@@ -116,22 +108,20 @@ impl Detector {
 
 impl Candidate {
     /// Creates a candidate with its first hit.
-    fn new(signal: Signal, at_ticks: u32, width_ns: u32) -> Self {
+    fn new(signal: Signal, at_ticks: u32) -> Self {
         Self {
             signal,
             hits: 1,
             misses: 0,
             first_at: at_ticks,
             last_at: at_ticks,
-            width_ns,
         }
     }
 
-    fn hit(self, at_ticks: u32, width_ns: u32) -> Self {
+    fn hit(self, at_ticks: u32) -> Self {
         Self {
             hits: self.hits.saturating_add(1),
             last_at: at_ticks,
-            width_ns,
             ..self
         }
     }
@@ -145,9 +135,4 @@ impl Candidate {
     fn lasts(&self, at_ticks: u32, gap_ticks: u32) -> bool {
         at_ticks.wrapping_sub(self.last_at) <= gap_ticks
     }
-}
-
-fn is_steady(kind: Pulse, before_ns: u32, width_ns: u32) -> bool {
-    let end_points = kind.end_points_ns();
-    before_ns.abs_diff(width_ns) <= (end_points.most - end_points.least) / STEADY_PART
 }

@@ -26,6 +26,8 @@ pub enum Event {
         kind: Pulse,
         /// Width, ns.
         width_ns: u32,
+        /// It follows from the pulse before it, in width and in time, as a sender's pulses do.
+        steady: bool,
     },
     /// Edges that were neither.
     Bad,

@@ -176,7 +176,7 @@ impl Input {
                     None
                 }
             }
-            Event::Pulse { kind, width_ns } => {
+            Event::Pulse { kind, width_ns, .. } => {
                 let step = self.calibration.pulse(now_us, kind.servo_ns(width_ns));
                 self.announcer.calibration(step);
                 if self.calibration.is_under_way() {

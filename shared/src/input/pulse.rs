@@ -1,7 +1,7 @@
 //! Decodes pulses, whose width is the throttle, from filtered edges.
 //!
 //! A pulse has no checksum. Its width, the time since the previous one, and a valid pulse before it tell it
-//! from other edges.
+//! from other edges; those that follow from it in width and in time tell a sender from noise.
 
 use super::event::Event;
 use super::signal::Pulse;
@@ -13,6 +13,14 @@ const MULTISHOT_PERIOD_NS: u32 = 28_000;
 
 /// The minimum low time between two pulses, ns; at least 1/64 of the later one also applies.
 const LOW_NS: u32 = 1_000;
+
+/// The most that a steady pulse's width may differ from the one before, as a divisor of the range: a stick going from
+/// end to end in 0.16 s at 50 Hz. Random pulses differ by more.
+const STEADY_PART: u32 = 8;
+
+/// The most by which a steady pulse's period may be a multiple or a part of the one before: a sender that leaves one
+/// out, or whose loop is late.
+const STEADY_RATIO: u32 = 2;
 
 /// Fraction bits of the tick duration.
 const TICK_PLACES: u32 = 24;
@@ -33,6 +41,8 @@ pub(super) struct Decoder {
     spacing: Option<Spacing>,
     /// The last pulse was valid.
     sound: bool,
+    /// The last valid pulse; `None` before the first.
+    before: Option<Before>,
 }
 
 /// Width limits of one kind, ticks: 0.8 of its minimum to 1.1 of its maximum, for senders with wider end points
@@ -44,12 +54,21 @@ struct Limits {
     most: u32,
     /// The minimum period from pulse to pulse.
     period: u32,
+    /// The most that a steady width differs from the one before.
+    stray: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Spacing {
     period: u32,
     low: u32,
+}
+
+/// What the next pulse is held against.
+#[derive(Clone, Copy, Debug)]
+struct Before {
+    width: u32,
+    period: Option<u32>,
 }
 
 impl Decoder {
@@ -65,6 +84,7 @@ impl Decoder {
             fall_at: 0,
             spacing: None,
             sound: true,
+            before: None,
         }
     }
 
@@ -85,14 +105,28 @@ impl Decoder {
         }
         let width = at_ticks.wrapping_sub(self.rise_at?);
         self.fall_at = at_ticks;
-        let kind = self.kind(width);
-        let sound = core::mem::replace(&mut self.sound, kind.is_some());
-        let Some(kind) = kind else {
+        let limits = self.limits(width);
+        let sound = core::mem::replace(&mut self.sound, limits.is_some());
+        let Some(Limits { kind, stray, .. }) = limits else {
             return Some(Event::Bad);
         };
+        let steady = self.steady(width, stray);
         sound.then(|| Event::Pulse {
             kind,
             width_ns: self.nanoseconds(width),
+            steady,
+        })
+    }
+
+    /// Returns true if the latest pulse follows from the one before it, and takes its place.
+    fn steady(&mut self, width: u32, stray: u32) -> bool {
+        let period = self.spacing.map(|spacing| spacing.period);
+        let before = self.before.replace(Before { width, period });
+        before.is_some_and(|before| {
+            let in_time = before.period.zip(period).is_none_or(|(before, period)| {
+                period / STEADY_RATIO <= before && before / STEADY_RATIO <= period
+            });
+            in_time && width.abs_diff(before.width) <= stray
         })
     }
 
@@ -106,17 +140,18 @@ impl Decoder {
     pub(super) fn clear(&mut self) {
         self.rise_at = None;
         self.sound = true;
+        self.before = None;
     }
 
-    /// Returns the kind of the latest pulse.
-    fn kind(&self, width: u32) -> Option<Pulse> {
+    /// Returns the limits of the latest pulse's kind.
+    fn limits(&self, width: u32) -> Option<Limits> {
         let mut kinds = self.kinds.iter();
         let limits = kinds.find(|limits| (limits.least..=limits.most).contains(&width))?;
         let apart = self.spacing.is_none_or(|spacing| {
             spacing.period >= limits.period && spacing.low >= self.low_ticks.max(width / 64)
         });
         let taken = self.only.is_none_or(|only| only == limits.kind);
-        (apart && taken).then_some(limits.kind)
+        (apart && taken).then_some(*limits)
     }
 
     fn nanoseconds(&self, ticks: u32) -> u32 {
@@ -137,6 +172,7 @@ impl Limits {
                 Pulse::Multishot => ticks(tick_hz, MULTISHOT_PERIOD_NS),
                 _ => 0,
             },
+            stray: ticks(tick_hz, (end_points.most - end_points.least) / STEADY_PART),
         }
     }
 }

@@ -1,5 +1,7 @@
 //! A complete throttle input, driven by edges and by events.
 
+mod noise;
+
 use std::vec::Vec;
 
 use super::authority::{Command, TestError};

@@ -1,4 +1,7 @@
-//! Tells a sender's frames from noise that occasionally passes the check.
+//! Tells a sender's frames and pulses from noise that occasionally passes the check.
+//!
+//! For a pulse the check is that it is steady, that is, follows from the one before. One random pulse in twelve does at
+//! most; of a sender's, all but where the throttle jumps.
 //!
 //! One random word in sixteen passes the four check bits, and nearly all of those are throttle. Each frame is
 //! therefore evidence: on a link where half of the frames are good, a good one is 8 times as likely as in noise
@@ -30,13 +33,17 @@ impl Default for Trust {
 }
 
 impl Trust {
-    /// Adds a frame with a correct checksum. Returns true if it is to be believed.
-    pub(super) fn good(&mut self) -> bool {
+    /// Adds a frame or pulse that passes its check.
+    pub(super) fn good(&mut self) {
         self.0 = MOST.min(self.0 + GOOD);
+    }
+
+    /// Returns true if the wire is to be believed.
+    pub(super) fn believes(&self) -> bool {
         self.0 >= BELIEVED
     }
 
-    /// Adds a frame that fails its check.
+    /// Adds one that fails it.
     pub(super) fn bad(&mut self) {
         self.0 = self.0.saturating_sub(1);
     }
@@ -74,7 +81,11 @@ mod tests {
     /// Returns the share of frames that are good and believed.
     fn believed(good: f64) -> f64 {
         let counts = counts(good);
-        let believes = |count: u8| Trust(count).good();
+        let believes = |count: u8| {
+            let mut trust = Trust(count);
+            trust.good();
+            trust.believes()
+        };
         let likely = (0..=MOST).filter(|count| believes(*count));
         good * likely.map(|count| counts[usize::from(count)]).sum::<f64>()
     }
@@ -98,7 +109,12 @@ mod tests {
         for (bad, cost) in [(12, 0), (13, 1), (1_000, 4)] {
             let mut trust = Trust::default();
             (0..bad).for_each(|_| trust.bad());
-            let missed = (0..100).take_while(|_| !trust.good()).count();
+            let missed = (0..100)
+                .take_while(|_| {
+                    trust.good();
+                    !trust.believes()
+                })
+                .count();
             assert_eq!(missed, cost, "{bad}");
         }
     }

@@ -109,6 +109,7 @@ fn pulses(tick_hz: u32, kind: Pulse) {
                         Event::Pulse {
                             kind: found,
                             width_ns: measured_ns,
+                            ..
                         },
                     ),
                 ] = heard

@@ -58,7 +58,7 @@ impl Bench {
     /// Armed and opened to this throttle.
     fn open(value: u16) -> Self {
         let mut bench = Self::armed();
-        bench.play(OPENING_FRAMES.into(), event(value));
+        bench.play(OPENING.into(), event(value));
         assert!(bench.turns());
         bench
     }

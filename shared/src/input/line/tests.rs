@@ -114,7 +114,9 @@ fn whole(events: &[Event], signal: Signal) -> bool {
     let [event] = events else { return false };
     let right = match *event {
         Event::Frame { frame, .. } => frame.value == 0 && !frame.telemetry,
-        Event::Pulse { kind, width_ns: ns } => ns.abs_diff(width_ns(kind)) <= 6,
+        Event::Pulse {
+            kind, width_ns: ns, ..
+        } => ns.abs_diff(width_ns(kind)) <= 6,
         Event::Bad => false,
     };
     right && event.signal() == Some(signal)

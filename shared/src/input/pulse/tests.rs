@@ -11,6 +11,8 @@ const TICK_HZ: u32 = 1_000_000_000;
 struct Wire {
     decoder: Decoder,
     now: u32,
+    /// The last pulse was steady.
+    steady: bool,
 }
 
 impl Wire {
@@ -18,20 +20,29 @@ impl Wire {
         Self {
             decoder: Decoder::new(TICK_HZ),
             now: 0,
+            steady: false,
         }
     }
 
-    /// A low level and a pulse, ns.
+    /// A low level and a pulse, ns. The event leaves out whether it is steady.
     fn pulse(&mut self, low: u32, width: u32) -> Option<Event> {
         self.now = self.now.wrapping_add(low);
         assert_eq!(self.decoder.edge(self.now, true), None);
         self.now = self.now.wrapping_add(width);
-        self.decoder.edge(self.now, false)
+        let mut event = self.decoder.edge(self.now, false);
+        if let Some(Event::Pulse { steady, .. }) = &mut event {
+            self.steady = core::mem::take(steady);
+        }
+        event
     }
 }
 
 fn pulse(kind: Pulse, width_ns: u32) -> Option<Event> {
-    Some(Event::Pulse { kind, width_ns })
+    Some(Event::Pulse {
+        kind,
+        width_ns,
+        steady: false,
+    })
 }
 
 #[test]
@@ -109,6 +120,33 @@ fn the_pulse_after_what_was_none_is_not_reported() {
         wire.pulse(5_000_000, 1_000_000),
         pulse(Pulse::Servo, 1_000_000)
     );
+}
+
+#[test]
+fn a_steady_pulse_follows_from_the_one_before() {
+    for kind in Pulse::ALL {
+        let ends = kind.end_points_ns();
+        let agree_ns = (ends.most - ends.least) / STEADY_PART;
+        let mut wire = Wire::new();
+        let mut steady = |low, width| {
+            assert!(wire.pulse(low, width).is_some());
+            wire.steady
+        };
+        let (middle, low) = (ends.least + 3 * agree_ns, ends.most + 40_000);
+        assert!(!steady(low, middle), "the first");
+        assert!(steady(low, middle) && steady(low, middle));
+        // In width.
+        assert!(steady(low - agree_ns, middle + agree_ns));
+        assert!(steady(low, middle));
+        assert!(!steady(low - agree_ns - 1, middle + agree_ns + 1));
+        assert!(!steady(low, middle), "back is as far");
+        assert!(steady(low, middle));
+        // In time: one left out, and back.
+        let period = low + middle;
+        assert!(steady(low + period, middle) && steady(low, middle));
+        assert!(!steady(low + period + 2, middle) && !steady(low, middle));
+        assert!(steady(low, middle));
+    }
 }
 
 #[test]

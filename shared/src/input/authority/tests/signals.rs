@@ -7,6 +7,7 @@ fn pulse(width_us: u32) -> Event {
     Event::Pulse {
         kind: Pulse::Servo,
         width_ns: width_us * 1000,
+        steady: true,
     }
 }
 
@@ -29,6 +30,8 @@ fn zero_pulses_arm_at_the_exact_time() {
     assert!(!bench.authority.armed(), "280 ms");
     bench.play_as(1, pulse(1000), SERVO);
     assert!(bench.authority.armed(), "300 ms");
+    bench.play_as(3, pulse(1510), SERVO);
+    assert_eq!(bench.authority.command(), Command::Zero);
     bench.play_as(1, pulse(1510), SERVO);
     let Command::Throttle(throttle) = bench.authority.command() else {
         panic!("half throttle");
@@ -111,7 +114,7 @@ fn another_reading_must_be_armed_anew_and_the_same_need_not() {
     assert!(!bench.authority.armed() && !bench.turns());
     assert!(bench.authority.refuses());
     bench.play_as(16, pulse(1500), SERVO);
-    bench.play_as(1, pulse(1000), SERVO);
+    bench.play_as(4, pulse(1000), SERVO);
     assert!(bench.turns());
 }
 
