@@ -5,8 +5,7 @@ mod station;
 
 use core::f64::consts::TAU;
 
-use mavlink::dialects::ardupilotmega::{MavCmd, MavResult, PARAM_SET_DATA};
-use mavlink::{MAVLinkV2MessageRaw, MavHeader};
+use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavCmd, MavResult, PARAM_SET_DATA};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
@@ -14,8 +13,6 @@ use siskin_control::drive::Phase;
 use siskin_control::params::ParamId;
 use siskin_emulator::bench::library;
 use siskin_emulator::device::Start;
-use siskin_emulator::link::LinkId;
-use siskin_emulator::rig::{Period, Rig};
 use siskin_emulator::scenario::stand;
 use station::{HALF, Station, ZERO};
 
@@ -349,24 +346,37 @@ fn it_ends_by_command_by_disarming_and_by_the_throttle_and_sets_nothing() {
     }
 }
 
+#[test]
+fn it_ends_when_the_client_that_began_it_is_gone() {
+    for (beats, ends) in [(5, true), (0, false)] {
+        let mut station = default();
+        station.ask(IDENTIFY, BEGIN);
+        for _ in 0..beats {
+            station.send(&HEARTBEAT_DATA::default());
+            station.run(1_000, None);
+            assert_eq!(last(&station), MavResult::MAV_RESULT_IN_PROGRESS);
+        }
+        // One that never sent any cannot be missed.
+        station.run(2_700, None);
+        let ended = has_said(&station, "Not identified: its client is gone");
+        assert_eq!(ended, ends);
+        assert_eq!(last(&station) == MavResult::MAV_RESULT_FAILED, ends);
+        if ends {
+            let phase = station.device.rig().snapshot().phase;
+            assert!(matches!(phase, Phase::Idle | Phase::Brake), "{phase:?}");
+        }
+    }
+}
+
 /// Writes MOT_IDENTIFY.
 fn write(station: &mut Station, value: f32) {
-    let mut raw = MAVLinkV2MessageRaw::new();
-    raw.serialize_message_data(
-        MavHeader::default(),
-        &PARAM_SET_DATA {
-            param_value: value,
-            target_system: 1,
-            target_component: 1,
-            param_id: ParamId::MotIdentify.entry().name.into(),
-            ..PARAM_SET_DATA::default()
-        },
-    );
-    let link = LinkId::default();
-    let bytes = raw.raw_bytes();
-    station
-        .device
-        .receive(link, bytes, &mut |_: f64, _: &Period, _: &Rig| {});
+    station.send(&PARAM_SET_DATA {
+        param_value: value,
+        target_system: 1,
+        target_component: 1,
+        param_id: ParamId::MotIdentify.entry().name.into(),
+        ..PARAM_SET_DATA::default()
+    });
 }
 
 /// Holds the stick by servo pulses of `width_us` for `for_ms`.

@@ -1,7 +1,7 @@
 //! An emulated ESC with a ground station.
 
 use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, MavMessage, MavResult};
-use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message};
+use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message, MessageData};
 use siskin_control::drive::Setpoint;
 use siskin_control::mavlink::Receiver;
 use siskin_emulator::device::{Device, Start};
@@ -109,22 +109,24 @@ impl Station {
 
     /// Sends a command with its first parameter.
     pub(crate) fn ask(&mut self, command: MavCmd, param1: f32) {
+        self.send(&COMMAND_LONG_DATA {
+            command,
+            param1,
+            target_system: 1,
+            target_component: 1,
+            ..COMMAND_LONG_DATA::default()
+        });
+    }
+
+    /// Sends a message.
+    pub(crate) fn send(&mut self, message: &impl MessageData) {
         let mut raw = MAVLinkV2MessageRaw::new();
         let header = MavHeader {
             system_id: 255,
             component_id: 190,
             sequence: 0,
         };
-        raw.serialize_message_data(
-            header,
-            &COMMAND_LONG_DATA {
-                command,
-                param1,
-                target_system: 1,
-                target_component: 1,
-                ..COMMAND_LONG_DATA::default()
-            },
-        );
+        raw.serialize_message_data(header, message);
         let mut nobody = |_: f64, _: &Period, _: &Rig| {};
         self.device
             .receive(LinkId::default(), raw.raw_bytes(), &mut nobody);

@@ -3,9 +3,9 @@
 use crate::mavlink::context::{Act, Context, Request};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    COMMAND_INT_DATA, COMMAND_LONG_DATA, FILE_TRANSFER_PROTOCOL_DATA, MISSION_REQUEST_LIST_DATA,
-    MavSeverity, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA,
-    SETUP_SIGNING_DATA,
+    COMMAND_INT_DATA, COMMAND_LONG_DATA, FILE_TRANSFER_PROTOCOL_DATA, HEARTBEAT_DATA,
+    MISSION_REQUEST_LIST_DATA, MavSeverity, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA,
+    PARAM_SET_DATA, SETUP_SIGNING_DATA,
 };
 
 use super::command::{ACCEPTED, Command, Commands, FAILED};
@@ -99,6 +99,9 @@ impl Component {
     pub fn handle(&mut self, frame: &Frame, context: &mut Context) {
         if frame.from == self.identity.address {
             return;
+        }
+        if frame.id == HEARTBEAT_DATA::ID {
+            self.commands.heartbeat(context.now_us, frame.from);
         }
         let target = target(frame).filter(|target| self.identity.is_for(*target));
         // Frames between others are not tracked.

@@ -5,11 +5,35 @@
 use mavlink::dialects::ardupilotmega::{MavResult, MavSeverity};
 
 use super::{
-    ACCEPTED, Act, Command, Commands, Context, DENIED, DriveStatus, IDENTIFY, IN_PROGRESS,
+    ACCEPTED, Act, Address, Command, Commands, Context, DENIED, DriveStatus, IDENTIFY, IN_PROGRESS,
     RUN_PREARM_CHECKS, Replies, Reply, TEMPORARILY_REJECTED,
 };
 
+/// Why an identification ends on request.
+pub(super) const CANCELLED_TEXT: &str = "cancelled";
+
+/// How long a client may leave out its heartbeats, µs; they come once a second.
+const GONE_US: u64 = 3_500_000;
+
 impl Commands {
+    /// Takes a client's heartbeat.
+    pub(in super::super) fn heartbeat(&mut self, now_us: u64, from: Address) {
+        if self.under_way.is_some_and(|command| command.from == from) {
+            self.beat_us = Some(now_us);
+        }
+    }
+
+    /// Ends an identification whose client has gone: nobody is there to end it. One that sends no heartbeats cannot be
+    /// missed.
+    pub(in super::super) fn poll(&mut self, now_us: u64) {
+        let identifies = |command: &Command| command.number == IDENTIFY;
+        let gone = |beat_us| now_us.saturating_sub(beat_us) > GONE_US;
+        if self.under_way.as_ref().is_some_and(identifies) && self.beat_us.is_some_and(gone) {
+            self.beat_us = None;
+            self.act = Some(Act::EndIdentification("its client is gone"));
+        }
+    }
+
     /// Begins or ends an identification, or keeps its results.
     pub(super) fn identify(
         &mut self,
@@ -20,7 +44,7 @@ impl Commands {
     ) -> MavResult {
         let act = match command.choice(0) {
             Some(0) => {
-                self.act = Some(Act::EndIdentification);
+                self.act = Some(Act::EndIdentification(CANCELLED_TEXT));
                 return ACCEPTED;
             }
             Some(1) => Act::Identify,
@@ -63,6 +87,7 @@ impl Commands {
             return TEMPORARILY_REJECTED;
         }
         self.under_way = Some(*command);
+        self.beat_us = None;
         self.act = Some(act);
         IN_PROGRESS
     }

@@ -30,6 +30,7 @@ impl Component {
     pub fn poll(&mut self, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
         self.writer.sender.signing.advance(context.now_us);
         self.files.rest();
+        self.commands.poll(context.now_us);
         self.report_faults(context, send);
         if !core::mem::replace(&mut self.started, true) {
             let text = ["Siskin ESC ", VERSION_TEXT, ", ", self.image.board];
