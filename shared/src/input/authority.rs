@@ -8,13 +8,13 @@
 //! either: one random word in sixteen passes by chance. That judgement takes some twelve frames, so a wire at
 //! zero opens only after several throttle frames in a row. Of armed wires that turn to noise at zero, one in
 //! 2170 then turns the motor; opening on the first throttle frame would let 57 of 100 turn it. A pulse has no
-//! checksum; that it follows from the one before is its check.
+//! checksum; that it is like the one before is its check.
 
 use super::Share;
 use super::command::within;
 use super::demand::Reading;
 use super::endpoints::Demand;
-use super::event::Event;
+use super::event::{Event, Likeness};
 use super::signal::Signal;
 use super::trust::Trust;
 use crate::math::Real;
@@ -27,7 +27,7 @@ const ARMING_PULSES: u32 = 5;
 /// Zeros, without throttle in between, that close an armed wire. In flight a zero may be another frame with errors
 /// that its checksum misses: it stops the motor until the next throttle frame. A wire is armed closed.
 const CLOSING: u8 = 10;
-/// Consecutive throttle frames, or steady pulses from the first on, without a bad one in between, that reopen it. They
+/// Consecutive throttle frames, or pulses like the one before from the second on, without a bad one in between, that reopen it. They
 /// delay the first by 0.75 ms at 4 kHz, 3 ms at 1 kHz, 60 ms with a servo's 50 Hz.
 const OPENING: u8 = 4;
 
@@ -216,11 +216,15 @@ impl Authority {
         if identified.is_some_and(|identified| identified != signal) {
             return self.count_failure();
         }
-        let steady = !matches!(event, Event::Pulse { steady: false, .. });
-        if steady {
-            self.trust.good();
-        } else {
-            self.trust.bad();
+        let likeness = match event {
+            Event::Pulse { likeness, .. } => likeness,
+            _ => Likeness::Both,
+        };
+        let open = self.armed && self.closing < CLOSING;
+        match likeness {
+            Likeness::Both => self.trust.good(),
+            Likeness::Either if open => {}
+            _ => self.trust.bad(),
         }
         match demand {
             Demand::Zero => {
@@ -230,7 +234,11 @@ impl Authority {
             Demand::Throttle(_) => {
                 self.arming = None;
                 self.test = None;
-                let row = if steady { self.opening } else { 0 };
+                let row = if likeness == Likeness::Both {
+                    self.opening
+                } else {
+                    0
+                };
                 self.opening = row.saturating_add(1);
             }
         }

@@ -26,11 +26,23 @@ pub enum Event {
         kind: Pulse,
         /// Width, ns.
         width_ns: u32,
-        /// It follows from the pulse before it, in width and in time, as a sender's pulses do.
-        steady: bool,
+        /// What it has in common with the pulse before it.
+        likeness: Likeness,
     },
     /// Edges that were neither.
     Bad,
+}
+
+/// What a pulse has in common with the one before it. A sender's pulses come at an even rate, and their width changes
+/// only as fast as its throttle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Likeness {
+    /// Width and period.
+    Both,
+    /// One of them.
+    Either,
+    /// Nothing, or there was none before it.
+    Neither,
 }
 
 impl Event {

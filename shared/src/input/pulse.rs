@@ -1,9 +1,9 @@
 //! Decodes pulses, whose width is the throttle, from filtered edges.
 //!
 //! A pulse has no checksum. Its width, the time since the previous one, and a valid pulse before it tell it
-//! from other edges; those that follow from it in width and in time tell a sender from noise.
+//! from other edges; those that are like it in width and in time tell a sender from noise.
 
-use super::event::Event;
+use super::event::{Event, Likeness};
 use super::signal::Pulse;
 use crate::math::quotient;
 
@@ -14,13 +14,13 @@ const MULTISHOT_PERIOD_NS: u32 = 28_000;
 /// The minimum low time between two pulses, ns; at least 1/64 of the later one also applies.
 const LOW_NS: u32 = 1_000;
 
-/// The most that a steady pulse's width may differ from the one before, as a divisor of the range: a stick going from
-/// end to end in 0.16 s at 50 Hz. Random pulses differ by more.
-const STEADY_PART: u32 = 8;
+/// The most that alike widths differ, as a divisor of the range: a stick going from end to end in 0.32 s at 50 Hz.
+/// Random pulses differ by more.
+const ALIKE_PART: u32 = 16;
 
-/// The most by which a steady pulse's period may be a multiple or a part of the one before: a sender that leaves one
-/// out, or whose loop is late.
-const STEADY_RATIO: u32 = 2;
+/// The most that of two alike periods one is a multiple of the other: a sender that leaves one out, or whose loop is
+/// late.
+const ALIKE_RATIO: u32 = 2;
 
 /// Fraction bits of the tick duration.
 const TICK_PLACES: u32 = 24;
@@ -54,8 +54,8 @@ struct Limits {
     most: u32,
     /// The minimum period from pulse to pulse.
     period: u32,
-    /// The most that a steady width differs from the one before.
-    stray: u32,
+    /// The most that alike widths differ.
+    alike: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -107,27 +107,31 @@ impl Decoder {
         self.fall_at = at_ticks;
         let limits = self.limits(width);
         let sound = core::mem::replace(&mut self.sound, limits.is_some());
-        let Some(Limits { kind, stray, .. }) = limits else {
+        let Some(Limits { kind, alike, .. }) = limits else {
             return Some(Event::Bad);
         };
-        let steady = self.steady(width, stray);
+        let likeness = self.likeness(width, alike);
         sound.then(|| Event::Pulse {
             kind,
             width_ns: self.nanoseconds(width),
-            steady,
+            likeness,
         })
     }
 
-    /// Returns true if the latest pulse follows from the one before it, and takes its place.
-    fn steady(&mut self, width: u32, stray: u32) -> bool {
+    /// Compares the latest pulse with the one before it, and keeps it for the next.
+    fn likeness(&mut self, width: u32, alike: u32) -> Likeness {
         let period = self.spacing.map(|spacing| spacing.period);
-        let before = self.before.replace(Before { width, period });
-        before.is_some_and(|before| {
-            let in_time = before.period.zip(period).is_none_or(|(before, period)| {
-                period / STEADY_RATIO <= before && before / STEADY_RATIO <= period
-            });
-            in_time && width.abs_diff(before.width) <= stray
-        })
+        let Some(before) = self.before.replace(Before { width, period }) else {
+            return Likeness::Neither;
+        };
+        let in_time = before.period.zip(period).is_none_or(|(before, period)| {
+            period / ALIKE_RATIO <= before && before / ALIKE_RATIO <= period
+        });
+        match (width.abs_diff(before.width) <= alike, in_time) {
+            (true, true) => Likeness::Both,
+            (false, false) => Likeness::Neither,
+            _ => Likeness::Either,
+        }
     }
 
     /// Records that an edge was missed: the next pulse counts as following a bad one.
@@ -172,7 +176,7 @@ impl Limits {
                 Pulse::Multishot => ticks(tick_hz, MULTISHOT_PERIOD_NS),
                 _ => 0,
             },
-            stray: ticks(tick_hz, (end_points.most - end_points.least) / STEADY_PART),
+            alike: ticks(tick_hz, (end_points.most - end_points.least) / ALIKE_PART),
         }
     }
 }

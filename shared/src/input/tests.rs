@@ -28,6 +28,7 @@ const TURNING: DriveStatus = DriveStatus {
 };
 
 /// An input, its clock, and the news and orders it has given.
+#[derive(Clone)]
 struct Bench {
     input: Input,
     now_us: u64,
@@ -375,6 +376,16 @@ fn the_stick_teaches_the_end_points_and_turns_nothing() {
     };
     let wanted = [Step::Full, Step::Done(ends), Step::Again, Step::Identify];
     assert_eq!(steps, wanted);
+}
+
+#[test]
+fn a_chip_that_was_reset_learns_nothing_from_the_stick() {
+    let mut bench = Bench::new(None);
+    bench.input.end_calibration();
+    bench.pulses(300, 1912);
+    bench.pulses(200, 1105);
+    let learns = |news: &(u64, News)| matches!(news.1, News::Calibration(_));
+    assert!(!bench.news.iter().any(learns), "{:?}", bench.news);
 }
 
 #[test]

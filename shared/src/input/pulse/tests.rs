@@ -11,8 +11,8 @@ const TICK_HZ: u32 = 1_000_000_000;
 struct Wire {
     decoder: Decoder,
     now: u32,
-    /// The last pulse was steady.
-    steady: bool,
+    /// Of the last pulse.
+    likeness: Likeness,
 }
 
 impl Wire {
@@ -20,18 +20,18 @@ impl Wire {
         Self {
             decoder: Decoder::new(TICK_HZ),
             now: 0,
-            steady: false,
+            likeness: Likeness::Neither,
         }
     }
 
-    /// A low level and a pulse, ns. The event leaves out whether it is steady.
+    /// A low level and a pulse, ns. The event leaves out its likeness.
     fn pulse(&mut self, low: u32, width: u32) -> Option<Event> {
         self.now = self.now.wrapping_add(low);
         assert_eq!(self.decoder.edge(self.now, true), None);
         self.now = self.now.wrapping_add(width);
         let mut event = self.decoder.edge(self.now, false);
-        if let Some(Event::Pulse { steady, .. }) = &mut event {
-            self.steady = core::mem::take(steady);
+        if let Some(Event::Pulse { likeness, .. }) = &mut event {
+            self.likeness = core::mem::replace(likeness, Likeness::Neither);
         }
         event
     }
@@ -41,7 +41,7 @@ fn pulse(kind: Pulse, width_ns: u32) -> Option<Event> {
     Some(Event::Pulse {
         kind,
         width_ns,
-        steady: false,
+        likeness: Likeness::Neither,
     })
 }
 
@@ -123,29 +123,31 @@ fn the_pulse_after_what_was_none_is_not_reported() {
 }
 
 #[test]
-fn a_steady_pulse_follows_from_the_one_before() {
+fn a_pulse_is_held_against_the_one_before() {
+    use Likeness::{Both, Either, Neither};
     for kind in Pulse::ALL {
         let ends = kind.end_points_ns();
-        let agree_ns = (ends.most - ends.least) / STEADY_PART;
+        let alike_ns = (ends.most - ends.least) / ALIKE_PART;
         let mut wire = Wire::new();
-        let mut steady = |low, width| {
+        let mut likeness = |low, width| {
             assert!(wire.pulse(low, width).is_some());
-            wire.steady
+            wire.likeness
         };
-        let (middle, low) = (ends.least + 3 * agree_ns, ends.most + 40_000);
-        assert!(!steady(low, middle), "the first");
-        assert!(steady(low, middle) && steady(low, middle));
+        let (middle, low) = (ends.least + 8 * alike_ns, ends.most + 40_000);
+        assert_eq!(likeness(low, middle), Neither, "the first");
+        assert_eq!(likeness(low, middle), Both);
         // In width.
-        assert!(steady(low - agree_ns, middle + agree_ns));
-        assert!(steady(low, middle));
-        assert!(!steady(low - agree_ns - 1, middle + agree_ns + 1));
-        assert!(!steady(low, middle), "back is as far");
-        assert!(steady(low, middle));
+        assert_eq!(likeness(low - alike_ns, middle + alike_ns), Both);
+        assert_eq!(likeness(low, middle), Both);
+        assert_eq!(likeness(low - alike_ns - 1, middle + alike_ns + 1), Either);
+        assert_eq!(likeness(low, middle), Either, "back is as far");
+        assert_eq!(likeness(low, middle), Both);
         // In time: one left out, and back.
         let period = low + middle;
-        assert!(steady(low + period, middle) && steady(low, middle));
-        assert!(!steady(low + period + 2, middle) && !steady(low, middle));
-        assert!(steady(low, middle));
+        assert_eq!(likeness(low + period, middle), Both);
+        assert_eq!(likeness(low, middle), Both);
+        assert_eq!(likeness(low + period + 2, middle), Either);
+        assert_eq!(likeness(low, middle - alike_ns - 1), Neither);
     }
 }
 

@@ -7,7 +7,7 @@ fn pulse(width_us: u32) -> Event {
     Event::Pulse {
         kind: Pulse::Servo,
         width_ns: width_us * 1000,
-        steady: true,
+        likeness: Likeness::Both,
     }
 }
 
