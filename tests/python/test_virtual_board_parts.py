@@ -75,7 +75,7 @@ def test_what_the_papers_image_has_stored_is_kept_and_not_in_force_in_flight(boa
 
     emulator = board(FLIGHT, *PATIENT)
     with emulator.connect() as esc:
-        told = esc.wait("STATUSTEXT", lambda m: m.text == "CTL_OBSERVER 0: not in this image, flash papers")
+        told = esc.wait("STATUSTEXT", lambda m: m.text == "CTL_OBSERVER 0: not in this image")
         assert told, "nothing is said of it"
         assert esc.read_param("CTL_OBSERVER").param_value == 0
         assert esc.read_param("LIM_PHASE_A").param_value == 15

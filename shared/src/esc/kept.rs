@@ -28,7 +28,7 @@ impl Esc {
             let _ = warning.push_str(id.entry().name);
             let _ = warning.push(' ');
             let _ = warning.push(number);
-            let _ = warning.push_str(": not in this image, flash papers");
+            let _ = warning.push_str(": not in this image");
             self.warn(warning);
         }
         if self.params.get(ParamId::MotPolePairs) == 0.0 {

@@ -98,7 +98,7 @@ fn take(id: ParamId, value: f32, stopped: bool, context: &mut Context) -> Result
         return Err(Refusal::new(NOT_PERMITTED, reason));
     }
     if id.lacks(value) && value != context.params.get(id) {
-        let reason = "not in this image: flash the papers image";
+        let reason = "not in this image: flash one that has it";
         return Err(Refusal::new(OUT_OF_RANGE, reason));
     }
     change(id, value, context)
