@@ -40,7 +40,8 @@ impl Esc {
             Act::Calibrate => throttle.lock(|throttle| throttle.calibrate(now_us, true)),
             Act::Check => self.check.begin(),
             Act::Identify => self.identify(now_us, false),
-            Act::EndIdentification(reason) => self.end_identification(reason),
+            Act::EndIdentification => self.end_identification("cancelled"),
+            Act::AbandonIdentification => self.end_identification("its client is gone"),
             Act::KeepIdentified => {
                 let kept = self.keep_identified();
                 self.component.check_done(kept);

@@ -20,8 +20,6 @@ mod calibration;
 mod check;
 mod motor;
 
-use check::CANCELLED_TEXT;
-
 const DO_MOTOR_TEST: u16 = MavCmd::MAV_CMD_DO_MOTOR_TEST as u16;
 const ACTUATOR_TEST: u16 = MavCmd::MAV_CMD_ACTUATOR_TEST as u16;
 const CONFIGURE_ACTUATOR: u16 = MavCmd::MAV_CMD_CONFIGURE_ACTUATOR as u16;
@@ -174,8 +172,8 @@ pub(super) struct Commands {
     storage: Option<Command>,
     /// The calibration or self-test under way.
     under_way: Option<Command>,
-    /// When the client that began it last sent a heartbeat.
-    beat_us: Option<u64>,
+    /// When the client that began it last sent a heartbeat, µs; it wraps in over an hour.
+    beat_us: Option<u32>,
     /// The last command that must not be obeyed twice, and its result.
     last: Option<(Command, MavResult)>,
     act: Option<Act>,
@@ -267,7 +265,7 @@ impl Commands {
             COMPONENT_ARM_DISARM => {
                 let arm = command.choice(0);
                 if arm == Some(0) {
-                    self.act = Some(Act::EndIdentification(CANCELLED_TEXT));
+                    self.act = Some(Act::EndIdentification);
                 }
                 arm_disarm(arm, context)
             }

@@ -79,7 +79,9 @@ pub enum Act {
     /// Begin an identification of the motor; its progress and end are reported like a self-test's.
     Identify,
     /// End it, if there is one.
-    EndIdentification(&'static str),
+    EndIdentification,
+    /// End it since the client that began it is gone.
+    AbandonIdentification,
     /// Keep its results; [`Component::check_done`](super::Component::check_done) reports it.
     KeepIdentified,
     /// Begin a self-test; [`Component::report_progress`](super::Component::report_progress) and

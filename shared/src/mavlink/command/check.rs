@@ -9,17 +9,18 @@ use super::{
     RUN_PREARM_CHECKS, Replies, Reply, TEMPORARILY_REJECTED,
 };
 
-/// Why an identification ends on request.
-pub(super) const CANCELLED_TEXT: &str = "cancelled";
-
 /// How long a client may leave out its heartbeats, µs; they come once a second.
-const GONE_US: u64 = 3_500_000;
+const GONE_US: u32 = 3_500_000;
 
 impl Commands {
     /// Takes a client's heartbeat.
     pub(in super::super) fn heartbeat(&mut self, now_us: u64, from: Address) {
-        if self.under_way.is_some_and(|command| command.from == from) {
-            self.beat_us = Some(now_us);
+        if self
+            .under_way
+            .as_ref()
+            .is_some_and(|command| command.from == from)
+        {
+            self.beat_us = Some(now_us as u32);
         }
     }
 
@@ -27,10 +28,10 @@ impl Commands {
     /// missed.
     pub(in super::super) fn poll(&mut self, now_us: u64) {
         let identifies = |command: &Command| command.number == IDENTIFY;
-        let gone = |beat_us| now_us.saturating_sub(beat_us) > GONE_US;
+        let gone = |beat_us| (now_us as u32).wrapping_sub(beat_us) > GONE_US;
         if self.under_way.as_ref().is_some_and(identifies) && self.beat_us.is_some_and(gone) {
             self.beat_us = None;
-            self.act = Some(Act::EndIdentification("its client is gone"));
+            self.act = Some(Act::AbandonIdentification);
         }
     }
 
@@ -44,7 +45,7 @@ impl Commands {
     ) -> MavResult {
         let act = match command.choice(0) {
             Some(0) => {
-                self.act = Some(Act::EndIdentification(CANCELLED_TEXT));
+                self.act = Some(Act::EndIdentification);
                 return ACCEPTED;
             }
             Some(1) => Act::Identify,
