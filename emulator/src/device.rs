@@ -117,6 +117,8 @@ pub struct Device {
     clock: Clock,
     task_due_ns: u64,
     faults: Timeline,
+    /// The supply is too low for the chip.
+    starved: bool,
     record: &'static Record,
 }
 
@@ -234,6 +236,7 @@ impl Device {
             clock,
             task_due_ns: 0,
             faults: Timeline::new(faults),
+            starved: false,
             record,
         };
         Ok((device, loaded.trouble()))
@@ -354,8 +357,9 @@ impl Device {
         let held = now.held || starved;
         if held != self.rig.is_held() || now.resets > before.resets {
             // Entering and leaving reset: all state is lost.
-            self.reboot();
+            self.reboot(starved || self.starved);
         }
+        self.starved = starved;
         self.rig.hold(held);
     }
 
@@ -388,7 +392,7 @@ impl Device {
                     let result = self.store(request);
                     self.esc.storage_done(&mut self.throttle, result);
                 }
-                Request::Reboot => self.reboot(),
+                Request::Reboot => self.reboot(false),
             }
         }
     }
@@ -432,13 +436,13 @@ impl Device {
         }
     }
 
-    /// Restarts the ESC; shaft, supply and wire go on as they are.
-    fn reboot(&mut self) {
+    /// Restarts the ESC, after a loss of power or without one; shaft, supply and wire go on as they are.
+    fn reboot(&mut self, power_up: bool) {
         let mut loaded = store::load(&mut self.flash, STORE);
         let params = &mut loaded.kept.params;
         apply(&mut self.overrides, params);
         // What cannot be built now was never in force: the old values stay.
-        let Ok((mut esc, throttle)) = Esc::new(
+        let Ok((mut esc, mut throttle)) = Esc::new(
             params.clone(),
             self.board,
             CAPTURE_HZ,
@@ -448,6 +452,9 @@ impl Device {
         };
         esc.recall(&loaded);
         esc.regroup(&self.esc);
+        if !power_up {
+            throttle.resume();
+        }
         self.record.open();
         esc.serve(self.record);
         let Ok(config) = esc.config() else { return };

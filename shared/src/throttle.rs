@@ -108,6 +108,12 @@ impl Throttle {
         }
     }
 
+    /// Takes no stick calibration from the first signal: the chip was reset without a loss of power, and the stick may be
+    /// anywhere.
+    pub fn resume(&mut self) {
+        self.input.end_calibration();
+    }
+
     /// Takes an edge of the throttle wire: its capture time, and the level after it. Returns what the sender
     /// asks for, to be passed to [`Throttle::answer`].
     pub fn edge(&mut self, now_us: u64, at_ticks: u32, level: bool) -> Option<Ask> {

@@ -12,3 +12,11 @@ mod stm32g4;
 pub use stm32f4::*;
 #[cfg(feature = "stm32g431")]
 pub use stm32g4::*;
+
+/// What caused a reset of the chip.
+pub(crate) struct Reset {
+    /// The supply came, or came back.
+    pub(crate) power_up: bool,
+    /// The watchdog was not fed.
+    pub(crate) starved: bool,
+}

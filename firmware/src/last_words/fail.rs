@@ -6,7 +6,7 @@ use cortex_m::peripheral::SCB;
 use heapless::String;
 
 use super::record::{DETAILS, Failure, Record, TEXT_BYTES};
-use crate::chip::{self, bridge};
+use crate::chip::bridge;
 
 struct Place(UnsafeCell<Record>);
 
@@ -41,15 +41,14 @@ pub fn restart() -> ! {
     SCB::sys_reset()
 }
 
-/// Returns why the previous run ended, unless by power-down or on request, and clears the record. Call it once,
-/// early.
-pub fn take() -> Option<String<TEXT_BYTES>> {
+/// Returns why the previous run ended, unless by power-down or on request, and clears the record; `starved` tells
+/// that its watchdog was not fed. Call it once, early.
+pub fn take(starved: bool) -> Option<String<TEXT_BYTES>> {
     // SAFETY: a failure in between writes the whole record and does not return.
     let record = unsafe { PLACE.0.get().read_volatile() };
     // SAFETY: as above.
     unsafe { PLACE.0.get().write_volatile(Record::empty()) };
     let text = record.text();
-    let starved = chip::take_watchdog_reset();
     let text = text
         .or_else(|| starved.then(|| String::try_from("Restart: the watchdog was not fed").ok())?);
     #[cfg(feature = "defmt")]

@@ -9,7 +9,7 @@ use siskin_control::params::choice::CtlObserver;
 use siskin_control::params::{Board, ParamId, Params};
 use siskin_control::record;
 use siskin_control::store;
-use siskin_control::throttle::Throttle;
+use siskin_control::throttle::{LockThrottle, Throttle};
 use static_cell::StaticCell;
 
 use super::health::Health;
@@ -23,7 +23,7 @@ use crate::board::wire::TICK_HZ;
 use crate::board::{BOARD, Bridge, Converters, Hardware};
 use crate::exchange::{InterruptEnd, SnapshotReader};
 use crate::storage::{Storage, range};
-use crate::{exchange, interrupt, last_words};
+use crate::{chip, exchange, interrupt, last_words};
 
 /// Set-point age at which the interrupt stops obeying it: ten missed renewals.
 const STALE_S: f32 = 0.01;
@@ -39,8 +39,12 @@ const LINE_BYTES: usize = 512;
 pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) -> MainTask<'_> {
     tell(esc, fit);
     recall_rest(esc, &mut hardware.flash);
-    let port = open_port(esc.params());
-    if let Some(text) = last_words::take() {
+    let mut port = open_port(esc.params());
+    let reset = chip::take_reset();
+    if !reset.power_up {
+        port.lock(Throttle::resume);
+    }
+    if let Some(text) = last_words::take(reset.starved) {
         esc.warn(text);
     }
     if record::KEPT {

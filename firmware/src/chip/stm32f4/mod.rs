@@ -11,6 +11,8 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::{Config, Peripherals};
 
+use super::Reset;
+
 /// Clock of the timers on APB2; those on APB1 run at half of it.
 pub const TIMER_HZ: u32 = 168_000_000;
 
@@ -87,10 +89,13 @@ pub(crate) fn heard(pin: usize) {
     EXTI.pr(0).write(|w| w.set_line(pin, true));
 }
 
-/// Returns true if the watchdog caused the last reset. Call it only once.
-pub(crate) fn take_watchdog_reset() -> bool {
-    let starved = RCC.csr().read().wdgrstf();
+/// Returns what caused the last reset. Call it only once.
+pub(crate) fn take_reset() -> Reset {
+    let causes = RCC.csr().read();
     // The flags persist until cleared.
     RCC.csr().modify(|w| w.set_rmvf(true));
-    starved
+    Reset {
+        power_up: causes.porrstf(),
+        starved: causes.wdgrstf(),
+    }
 }

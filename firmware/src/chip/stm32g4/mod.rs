@@ -11,6 +11,8 @@ use embassy_stm32::interrupt;
 use embassy_stm32::pac;
 use embassy_stm32::pac::adc::Adc;
 
+use super::Reset;
+
 pub(crate) use clock::{hal_baud, start};
 
 /// Clock of the timers.
@@ -36,10 +38,14 @@ pub(crate) fn break_on_lock_up() {
     pac::SYSCFG.cfgr2().modify(|w| w.set_cll(true));
 }
 
-/// Returns true if the watchdog caused the last reset. Call it only once.
-pub(crate) fn take_watchdog_reset() -> bool {
-    let starved = pac::RCC.csr().read().iwdgrstf();
+/// Returns what caused the last reset. Call it only once.
+pub(crate) fn take_reset() -> Reset {
+    let causes = pac::RCC.csr().read();
     // The flags persist until cleared.
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
-    starved
+    Reset {
+        // A power-up sets it too (RM0440, 7.4.29).
+        power_up: causes.borrstf(),
+        starved: causes.iwdgrstf(),
+    }
 }

@@ -6,6 +6,7 @@ use crate::common::{
 use crate::flight_controller::{Exchange, FlightController};
 use mavlink::dialects::ardupilotmega::{PARAM_REQUEST_LIST_DATA, PARAM_VALUE_DATA};
 use siskin_control::answer::{REPLY_DELAY_NS, gcr};
+use siskin_vboard::chip::Cause;
 
 /// Returns the period in a reply, µs: `eeemmmmmmmmm`, m·2^e; `None` at standstill.
 fn period_us(bits: u32) -> Option<u32> {
@@ -104,6 +105,28 @@ fn pulses_turn_the_motor() {
     println!("1500 rpm after {fast:?} ns, {:?}", board.heard.texts());
     assert!(fast.is_some(), "{} rpm", board.rpm());
     assert_eq!(board.world().bridge().violations(), 0);
+}
+
+/// Full throttle from power-up, held, and then none teach the end points. After any other reset they teach nothing.
+#[test]
+fn the_stick_calibrates_after_a_power_up_alone() {
+    for (cause, calibrates) in [
+        (Cause::Power, true),
+        (Cause::Software, false),
+        (Cause::Pin, false),
+    ] {
+        let mut board = Board::new(&image(), &[]);
+        board.throttle = Throttle::Pulse(1_900_000);
+        board.run(200 * MS);
+        board.reset(cause);
+        board.heard.frames.clear();
+        board.run(3_000 * MS);
+        board.throttle = Throttle::Pulse(1_100_000);
+        board.run(2_000 * MS);
+        let texts = board.heard.texts();
+        let calibrated = texts.iter().any(|text| text.contains("calibrat"));
+        assert_eq!(calibrated, calibrates, "{cause:?}: {texts:?}");
+    }
 }
 
 /// Zero throttle frames at 4 kHz, a sixth of the PWM frequency, starting anywhere in the board's start. At
