@@ -69,6 +69,7 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
         capture: Capture::new(edges, asked),
         setpoint: ends.setpoint,
         snapshot,
+        frame_ticks: None,
     };
     throttle::start(listener, Replier::new(reply, update));
 

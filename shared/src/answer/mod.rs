@@ -12,6 +12,8 @@ pub mod info;
 pub mod kiss;
 mod schedule;
 
+use core::num::NonZeroU32;
+
 use crate::drive::Snapshot;
 use crate::input::command::Order;
 use crate::input::dshot::Rate;
@@ -26,6 +28,9 @@ use schedule::{Kind, Schedule};
 /// Time from the end of a frame to its reply, ns, at every rate.
 pub const REPLY_DELAY_NS: u32 = 30_000;
 
+/// Bits of a frame.
+const FRAME_BITS: u32 = 16;
+
 /// The answers a frame requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ask {
@@ -33,6 +38,8 @@ pub struct Ask {
     pub first_edge_ticks: u32,
     /// Bit rate of the frame.
     pub rate: Rate,
+    /// Duration of the frame, in the same ticks, if its sender's clock is off.
+    pub frame_ticks: Option<NonZeroU32>,
     /// The frame is to be answered on its wire.
     pub bidirectional: bool,
     /// Telemetry is to be sent on the serial line.
@@ -64,7 +71,7 @@ pub struct Serial {
 pub struct Reply {
     /// 21 bits, first bit highest; 1 is line high.
     pub bits: u32,
-    /// Bits per second: 5/4 of the frame's.
+    /// Bits per second: 5/4 of the frame's, by its sender's clock.
     pub bit_hz: u32,
     /// Time of the first bit, in ticks of the capture timer.
     pub at_ticks: u32,
@@ -78,6 +85,7 @@ impl Ask {
             bidirectional,
             frame,
             first_edge_ticks,
+            frame_ticks,
         } = *event
         else {
             return None;
@@ -86,6 +94,7 @@ impl Ask {
         (bidirectional || frame.telemetry || info).then_some(Self {
             first_edge_ticks,
             rate,
+            frame_ticks,
             bidirectional,
             telemetry: frame.telemetry,
         })
@@ -97,6 +106,10 @@ impl Ask {
 pub struct Answers {
     /// Time from a frame's first edge to its reply, ticks, in the order of [`Rate::ALL`].
     reply_ticks: [u32; Rate::ALL.len()],
+    /// Ticks in so many seconds as a frame has bits in its reply's rate.
+    frames_hz: u64,
+    /// Time from a frame's end to its reply.
+    delay_ticks: u32,
     /// How long a KISS frame, and the ESC's information, occupy the serial line.
     kiss_ticks: u32,
     info_ticks: u32,
@@ -118,6 +131,8 @@ impl Answers {
         let ticks = |time_us| quotient(u64::from(tick_hz) * u64::from(time_us), 1_000_000);
         Self {
             reply_ticks: Rate::ALL.map(|rate| reply_ticks(tick_hz, rate)),
+            frames_hz: u64::from(tick_hz) * u64::from(FRAME_BITS * 5 / 4),
+            delay_ticks: ticks(REPLY_DELAY_NS / 1_000),
             kiss_ticks: ticks(kiss::SPACING_US),
             info_ticks: ticks(info::SPACING_US),
             asked_at_ticks: None,
@@ -167,10 +182,16 @@ impl Answers {
                 }
                 None => speed_bits,
             };
-            let reply_ticks = self.reply_ticks[ask.rate as usize];
+            let (bit_hz, reply_ticks) = match ask.frame_ticks {
+                None => (reply_bit_hz(ask.rate), self.reply_ticks[ask.rate as usize]),
+                Some(ticks) => {
+                    let ticks = ticks.get();
+                    (quotient(self.frames_hz, ticks), self.delay_ticks + ticks)
+                }
+            };
             Reply {
                 bits,
-                bit_hz: reply_bit_hz(ask.rate),
+                bit_hz,
                 at_ticks: ask.first_edge_ticks.wrapping_add(reply_ticks),
             }
         })
@@ -248,11 +269,10 @@ pub const fn reply_bit_hz(rate: Rate) -> u32 {
     rate.bit_hz() / 4 * 5
 }
 
-/// Returns the time from a frame's first edge to its reply, in ticks rounded to nearest: 16 nominal bits,
-/// whatever the frame's own timing, and the delay.
+/// Returns the time from a nominal frame's first edge to its reply, in ticks rounded to nearest.
 fn reply_ticks(tick_hz: u32, rate: Rate) -> u32 {
     // 16 bits in units of 10⁻⁹/3 s, of which every rate's bit is a whole number.
-    let frame = 16 * (1_000_000_000 / (rate.bit_hz() / 3));
+    let frame = FRAME_BITS * (1_000_000_000 / (rate.bit_hz() / 3));
     let whole = u64::from(frame + 3 * REPLY_DELAY_NS);
     quotient(whole * u64::from(tick_hz) + 1_500_000_000, 3_000_000_000)
 }

@@ -39,6 +39,7 @@ impl Rig {
             .wrapping_add(after_us * (TICK_HZ / 1_000_000));
         let ask = Ask {
             first_edge_ticks: self.now_ticks,
+            frame_ticks: None,
             rate,
             bidirectional,
             telemetry,
@@ -73,6 +74,30 @@ fn the_reply_begins_30_us_after_sixteen_bits_at_every_rate_and_timer() {
             let exact_s = 16.0 / f64::from(rate.bit_hz()) + 30e-6;
             assert!((f64::from(ticks) - exact_s * f64::from(tick_hz)).abs() <= 0.5);
         }
+    }
+}
+
+#[test]
+fn a_sender_whose_clock_is_off_is_answered_by_it() {
+    let mut rig = Rig::new();
+    for bit in [0.8, 1.114, 1.33] {
+        let frame_s = 16.0 * bit / 600e3;
+        let frame_ticks = (frame_s * f64::from(TICK_HZ)) as u32;
+        let ask = Ask {
+            first_edge_ticks: rig.now_ticks,
+            frame_ticks: NonZeroU32::new(frame_ticks),
+            rate: Rate::Dshot600,
+            bidirectional: true,
+            telemetry: false,
+        };
+        let reply = rig
+            .answers
+            .reply(ask, 0, &rig.telemetry)
+            .expect("asked for");
+        assert!((f64::from(reply.bit_hz) * bit / 750e3 - 1.0).abs() < 1e-3);
+        let ticks = reply.at_ticks.wrapping_sub(rig.now_ticks);
+        let exact_s = frame_s + 30e-6;
+        assert!((f64::from(ticks) - exact_s * f64::from(TICK_HZ)).abs() <= 2.0);
     }
 }
 

@@ -4,6 +4,8 @@
 //! checksum matches. A frame is reported at its last edge. Edges that belong to none are reported once per 32,
 //! or when the line comes to rest.
 
+use core::num::NonZeroU32;
+
 use super::dshot::{Frame, Rate, check_mask};
 use super::event::Event;
 use super::filter::{Edge, since};
@@ -29,6 +31,9 @@ const LONGEST: u32 = 15;
 /// The most a single bit may deviate from the mean.
 const STRAY: u32 = 3;
 
+/// The most that a sender's clock may be off to count as nominal, as a divisor.
+const NOMINAL_PART: u32 = 32;
+
 /// The minimum ticks per bit to tell a zero from a one: 7.2 MHz for DShot600.
 const LEAST_TICKS: u32 = 12;
 
@@ -51,7 +56,7 @@ pub(super) struct Decoder {
     only: Option<(Rate, bool)>,
     /// A level at least this long is not part of a frame.
     rest_ticks: u32,
-    /// A level shorter than this is not the rest before a frame, even the fastest: 1.375 bits.
+    /// A level shorter than this is not the rest before a frame, even the fastest: 1.125 bits.
     rest_least: u32,
     times: [u32; KEPT],
     rates: [Option<Limits>; 4],
@@ -61,14 +66,15 @@ pub(super) struct Decoder {
 #[derive(Clone, Copy, Debug)]
 struct Limits {
     rate: Rate,
-    /// Total of a frame's full bit periods, ticks: the mean within a twelfth.
-    ///
-    /// Of that, 5 % is the sender's clock and 1 % jitter: at most 132 ns, a fifteenth per bit.
+    /// Total of a frame's full bit periods, ticks: 0.75 to 1.35 of nominal. Rates are a factor of two apart, and some
+    /// flight controllers' bits are a ninth longer than they should be.
     span_least: u32,
     span_most: u32,
-    /// 1.5 bits. Within a frame no level exceeds 0.95 bits; after it, senders leave at least 2 bits plus the
-    /// remainder of the last one.
+    /// 1.5 bits. Within a frame no level is as long as 1.3, even of the slowest clock; after it, senders leave at least
+    /// 2 bits plus the remainder of the last one.
     rest_ticks: u32,
+    /// Nominal duration of 16 bits.
+    frame_ticks: u32,
 }
 
 impl Decoder {
@@ -263,23 +269,26 @@ impl Decoder {
         bidirectional: bool,
         bit: impl Fn(usize) -> (u32, u32),
     ) -> Option<Event> {
-        let rate = self.rate(span)?;
+        let limits = self.limits(span)?;
         let frame = Frame::from_bits(read(span, bit)? ^ check_mask(bidirectional))?;
+        let frame_ticks = span + span / WHOLE_BITS;
+        let off = frame_ticks.abs_diff(limits.frame_ticks) > limits.frame_ticks / NOMINAL_PART;
         Some(Event::Frame {
-            rate,
+            rate: limits.rate,
             bidirectional,
             frame,
             first_edge_ticks,
+            frame_ticks: NonZeroU32::new(frame_ticks).filter(|_| off),
         })
     }
 
-    /// Returns the accepted rate whose full bit periods take `span`.
-    fn rate(&self, span: u32) -> Option<Rate> {
+    /// Returns the limits of the accepted rate whose full bit periods take `span`.
+    fn limits(&self, span: u32) -> Option<&Limits> {
         let mut taken = self.rates.iter().flatten();
         let limits = taken.find(|limits| (limits.span_least..=limits.span_most).contains(&span))?;
         self.only
             .is_none_or(|(rate, _)| rate == limits.rate)
-            .then_some(limits.rate)
+            .then_some(limits)
     }
 }
 
@@ -326,9 +335,10 @@ impl Limits {
         };
         (ticks(1, 1) >= LEAST_TICKS).then(|| Self {
             rate,
-            span_least: ticks(11 * WHOLE_BITS, 12),
-            span_most: ticks(13 * WHOLE_BITS, 12) + 1,
+            span_least: ticks(3 * WHOLE_BITS, 4),
+            span_most: ticks(27 * WHOLE_BITS, 20) + 1,
             rest_ticks: ticks(3, 2),
+            frame_ticks: ticks(WHOLE_BITS + 1, 1),
         })
     }
 }

@@ -1,5 +1,7 @@
 //! Events on a line.
 
+use core::num::NonZeroU32;
+
 use super::dshot::{Frame, Rate};
 use super::signal::{Pulse, Signal};
 
@@ -19,6 +21,8 @@ pub enum Event {
         frame: Frame,
         /// Time of the first edge, in ticks of the capture timer.
         first_edge_ticks: u32,
+        /// Duration of its 16 bits, in the same ticks, if its sender's clock is off by more than 3 %.
+        frame_ticks: Option<NonZeroU32>,
     },
     /// A pulse.
     Pulse {

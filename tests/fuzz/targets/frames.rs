@@ -147,10 +147,18 @@ impl Sender {
         let answer = self.desk.throttle.answer(ask, &snapshot);
         if let Some(reply) = answer.reply {
             assert!(gcr::decode(reply.bits).is_some(), "{:021b}", reply.bits);
-            assert_eq!(reply.bit_hz, ask.rate.bit_hz() / 4 * 5);
-            let ticks = reply.at_ticks.wrapping_sub(ask.first_edge_ticks);
-            let delay_ns = u64::from(ticks) * 1_000_000_000 / u64::from(CAPTURE_HZ);
-            let wanted_ns = u64::from(ask.rate.frame_ns() + REPLY_DELAY_NS);
+            let to_ns = |ticks: u32| u64::from(ticks) * 1_000_000_000 / u64::from(CAPTURE_HZ);
+            let nominal_ns = u64::from(ask.rate.frame_ns());
+            let frame_ns = ask
+                .frame_ticks
+                .map_or(nominal_ns, |ticks| to_ns(ticks.get()));
+            let bit_ns = 1_000_000_000 / u64::from(reply.bit_hz);
+            assert!(
+                (20 * bit_ns).abs_diff(frame_ns) < 100,
+                "{bit_ns} {frame_ns}"
+            );
+            let delay_ns = to_ns(reply.at_ticks.wrapping_sub(ask.first_edge_ticks));
+            let wanted_ns = frame_ns + u64::from(REPLY_DELAY_NS);
             assert!(delay_ns.abs_diff(wanted_ns) < 1_000, "{delay_ns} ns");
         }
         if let Some(frame) = answer.kiss {

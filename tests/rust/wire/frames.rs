@@ -62,7 +62,9 @@ fn dshot_frames(tick_hz: u32, rate: Rate, bidirectional: bool) {
                     (
                         _,
                         event @ Event::Frame {
-                            first_edge_ticks, ..
+                            first_edge_ticks,
+                            frame_ticks,
+                            ..
                         },
                     ),
                 ] = heard
@@ -74,6 +76,7 @@ fn dshot_frames(tick_hz: u32, rate: Rate, bidirectional: bool) {
                     bidirectional,
                     frame,
                     first_edge_ticks,
+                    frame_ticks,
                 };
                 assert_eq!(event, wanted, "{}, run {run}", signal.name());
                 let start_ticks = wire.ticks(start_ps) as u32;

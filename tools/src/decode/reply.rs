@@ -2,7 +2,6 @@
 
 use siskin_control::answer::extended::Extended;
 use siskin_control::answer::{erpm, gcr};
-use siskin_control::input::dshot::Rate;
 
 use super::Edge;
 
@@ -74,11 +73,11 @@ pub(super) enum Heard {
 }
 
 impl Listener {
-    /// Listens after a frame that ended at `end_ns`.
-    pub(super) fn new(end_ns: i64, rate: Rate) -> Self {
+    /// Listens after a frame that began at `begin_ns` and whose 16 bits took `frame_ns`.
+    pub(super) fn new(begin_ns: i64, frame_ns: u32) -> Self {
         Self {
-            end_ns,
-            bit_ns: 0.8e9 / f64::from(rate.bit_hz()),
+            end_ns: begin_ns + i64::from(frame_ns),
+            bit_ns: f64::from(frame_ns) / 16.0 * 0.8,
             edges: Vec::new(),
         }
     }

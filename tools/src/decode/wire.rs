@@ -1,5 +1,7 @@
 //! Passes one wire's edges through the ESC's own decoder.
 
+use std::num::NonZeroU32;
+
 use siskin_control::input::line::{Event, Line};
 use siskin_control::input::signal::Signal;
 
@@ -133,6 +135,7 @@ impl Wire {
             rate,
             bidirectional,
             first_edge_ticks,
+            frame_ticks,
             ..
         } = event
         {
@@ -140,8 +143,8 @@ impl Wire {
             let begin_ns = self.now_ns.unwrap_or(0) - i64::from(since_ns);
             first_edge_ns = Some(begin_ns);
             if bidirectional {
-                let end_ns = begin_ns + i64::from(rate.frame_ns());
-                self.listener = Some(Listener::new(end_ns, rate));
+                let frame_ns = frame_ticks.map_or(rate.frame_ns(), NonZeroU32::get);
+                self.listener = Some(Listener::new(begin_ns, frame_ns));
             }
         }
         tell(Item::Event(Found {

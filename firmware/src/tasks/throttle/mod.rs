@@ -8,6 +8,7 @@ mod capture;
 mod reply;
 
 use core::cell::{RefCell, RefMut};
+use core::num::NonZeroU32;
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -72,9 +73,9 @@ fn borrow<'a>(throttle: &'a RefCell<&'static mut Throttle>) -> RefMut<'a, &'stat
 const RENEWAL_US: u32 = 1000;
 
 /// Times of looks after a first edge, last look first, while the signal is unknown. DShot1200 and 600 are
-/// complete at the first look and DShot300 at the second; at the last one DShot150 is, and everything else is
-/// taken edge by edge.
-const UNKNOWN_LOOKS_US: [u32; 3] = [120, 60, 30];
+/// complete at the first look and DShot300 at the second, as is a DShot600 of a slow clock; at the last one DShot150
+/// is, and everything else is taken edge by edge.
+const UNKNOWN_LOOKS_US: [u32; 3] = [150, 75, 30];
 
 /// Time from a pulse's first edge to the look; if the pulse is longer, its second edge starts another look.
 const PULSE_LOOK_US: u32 = 30;
@@ -96,6 +97,8 @@ pub(crate) struct Listener {
     pub(crate) capture: Capture,
     pub(crate) setpoint: SetpointWriter,
     pub(crate) snapshot: &'static SnapshotReader,
+    /// Of the last frame, if its sender's clock is off.
+    pub(crate) frame_ticks: Option<NonZeroU32>,
 }
 
 /// Listens forever.
@@ -200,7 +203,7 @@ impl Listener {
             bidirectional,
         }) = signal
         {
-            let apart_ticks = eighths_ticks(rate, FRAME_APART_EIGHTHS);
+            let apart_ticks = self.eighths_ticks(rate, FRAME_APART_EIGHTHS);
             let first = usize::from(bidirectional);
             // Edge by edge a frame takes 140 µs: a task that is behind would stay behind.
             if self.capture.edges.skip_to_last_frame(first, apart_ticks) {
@@ -215,7 +218,7 @@ impl Listener {
             _ if !edge => (0, Vec::from_iter([0])),
             Some(Signal::Dshot { rate, .. }) => {
                 let [late, last] = [LATE_LOOK_EIGHTHS, FRAME_LOOK_EIGHTHS]
-                    .map(|eighths| eighths_ticks(rate, eighths));
+                    .map(|eighths| self.eighths_ticks(rate, eighths));
                 let waking_ticks = last.saturating_sub(capture::ticks_of_us(WAKING_US));
                 (last, Vec::from_iter([late, waking_ticks]))
             }
@@ -227,6 +230,14 @@ impl Listener {
             after_ticks,
             until_ticks: begin_ticks.wrapping_add(last_ticks),
             unheard: None,
+        }
+    }
+
+    /// Returns so many eighths of a bit in ticks; 144 at most.
+    fn eighths_ticks(&self, rate: Rate, eighths: u32) -> u32 {
+        match self.frame_ticks {
+            Some(ticks) => ticks.get() * eighths / 128,
+            None => TICK_HZ / 8 * eighths / rate.bit_hz(),
         }
     }
 
@@ -249,6 +260,9 @@ impl Listener {
                 return Some((None, Some(throttle.setpoint())));
             }
             let ask = take_in(throttle, edges, looks, ready)?;
+            if let Some(ask) = ask {
+                self.frame_ticks = ask.frame_ticks;
+            }
             let query = ask.zip(ready).map(|(ask, ready)| Query {
                 ask,
                 reply: throttle.reply(ask, ready.speed_bits),
@@ -379,9 +393,4 @@ fn edge_by_edge(throttle: &mut Throttle, edges: &mut Edges<TIMER_BITS>) -> Optio
 /// Returns the tasks' time.
 fn now_us() -> u64 {
     now().as_micros()
-}
-
-/// Returns so many eighths of a bit in ticks; 144 at most.
-fn eighths_ticks(rate: Rate, eighths: u32) -> u32 {
-    TICK_HZ / 8 * eighths / rate.bit_hz()
 }

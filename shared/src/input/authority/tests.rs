@@ -27,6 +27,7 @@ fn event(value: u16) -> Event {
         rate: Rate::Dshot600,
         bidirectional: false,
         first_edge_ticks: 0,
+        frame_ticks: None,
         frame: Frame {
             value,
             telemetry: false,

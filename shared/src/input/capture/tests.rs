@@ -75,6 +75,7 @@ impl Wire {
             bidirectional: self.bidirectional,
             frame,
             first_edge_ticks: self.ticks(start_ns),
+            frame_ticks: None,
         })
     }
 
@@ -169,11 +170,36 @@ fn slow_timers_take_what_they_can_tell_apart() {
 }
 
 #[test]
-fn clocks_far_off_are_refused() {
+fn a_clock_that_is_off_is_taken_and_measured() {
     for rate in Rate::ALL {
-        for speed in [0.90, 1.11] {
-            let events = Wire::new(TICK_HZ, false).frame(WORD, rate, speed);
-            assert!(at_the_end(&events, Some(Event::Bad)), "{rate:?} {speed}");
+        for bit in [0.76, 0.9, 0.96, 0.98, 1.0, 1.02, 1.04, 1.114, 1.2, 1.34] {
+            let events = Wire::new(TICK_HZ, false).frame(WORD, rate, 1.0 / bit);
+            let Some(Some(Event::Frame {
+                rate: found,
+                frame_ticks,
+                ..
+            })) = events.last()
+            else {
+                panic!("{rate:?} {bit}: {events:?}");
+            };
+            assert_eq!(*found, rate, "{bit}");
+            let is_off = f64::abs(bit - 1.0) > 0.03;
+            assert_eq!(frame_ticks.is_some(), is_off, "{rate:?} {bit}");
+            if let Some(ticks) = frame_ticks {
+                let frame_ns = f64::from(ticks.get()) * 1e9 / f64::from(TICK_HZ);
+                let error = frame_ns / (f64::from(rate.frame_ns()) * bit) - 1.0;
+                assert!(error.abs() < 0.01, "{rate:?} {bit}: {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn clocks_between_two_rates_are_refused() {
+    for rate in Rate::ALL {
+        for bit in [0.73, 1.38] {
+            let events = Wire::new(TICK_HZ, false).frame(WORD, rate, 1.0 / bit);
+            assert!(at_the_end(&events, Some(Event::Bad)), "{rate:?} {bit}");
         }
     }
 }
@@ -371,12 +397,15 @@ proptest! {
             let start_ns = wire.now_ns + 100.0;
             wire.now_ns += f64::from(rate.frame_ns() + 2 * rate.bit_ns()) / speed;
             let wanted = wire.wanted(bits, rate, start_ns + jitter_ns[0]);
-            let events: Vec<_> = edges(bits ^ wire.check(), rate)
+            let mut events: Vec<_> = edges(bits ^ wire.check(), rate)
                 .zip(jitter_ns)
                 .map(|((at_ns, active), jitter_ns)| {
                     wire.edge(start_ns + f64::from(at_ns) / speed + jitter_ns, active)
                 })
                 .collect();
+            if let Some(Some(Event::Frame { frame_ticks, .. })) = events.last_mut() {
+                *frame_ticks = None;
+            }
             prop_assert!(at_the_end(&events, wanted), "{events:?}");
         }
     }

@@ -161,6 +161,26 @@ fn a_signal_of_4_khz_is_found_out_and_answered() {
     }
 }
 
+/// Bits shorter by a fifth, longer by a ninth and by a third: each is found out and answered by the sender's clock.
+#[test]
+fn a_sender_whose_clock_is_off_is_answered_at_its_rate() {
+    for bit in [0.8, 1.114, 1.33] {
+        let mut board = Board::new(&image(), &[]);
+        board.protocol = BIDIRECTIONAL_600;
+        let controller = FlightController {
+            bit_hz: 600e3 / bit,
+        };
+        let exchanges = controller.fly(&mut board, 0, 1_000, |_| 500_000.0);
+        let answered = |exchange: &&Exchange| exchange.word().is_some();
+        let late = exchanges[600..].iter().filter(answered).count();
+        println!("bits of {bit}: {late} of the last 400 are answered");
+        let texts = board.heard.texts();
+        let name = "Throttle: bidirectional DShot600";
+        assert!(texts.iter().any(|text| text == name), "{texts:?}");
+        assert!(late >= 398, "{bit}: {late}");
+    }
+}
+
 /// The power-up tunes, a start, a stop that outlasts the drivers' supplies, and another start: all begin with
 /// the low sides.
 #[test]
