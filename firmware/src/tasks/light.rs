@@ -5,7 +5,8 @@ use embassy_time::{Duration, Instant};
 use siskin_control::drive::Snapshot;
 
 /// Flashes once when all is well, or as often as the lowest-numbered fault requires, followed by a pause. Dark
-/// means that the control is not running. Even blinking comes from [`crate::damaged`].
+/// means that the control is not running. Even blinking comes from [`crate::damaged`]. While the throttle wire carries
+/// nothing that is known, light and dark change places.
 pub(crate) struct Light {
     pin: Output<'static>,
     due: Instant,
@@ -24,7 +25,13 @@ impl Light {
     }
 
     /// Shows the pattern that is due. If all is well, a flight controller may have ordered the light on.
-    pub(crate) fn poll(&mut self, now: Instant, snapshot: Option<&Snapshot>, ordered: bool) {
+    pub(crate) fn poll(
+        &mut self,
+        now: Instant,
+        snapshot: Option<&Snapshot>,
+        ordered: bool,
+        unknown: bool,
+    ) {
         if now < self.due {
             return;
         }
@@ -42,7 +49,8 @@ impl Light {
             steps if steps.is_multiple_of(2) => (true, 50),
             _ => (false, 200),
         };
-        self.pin.set_level(lit.into());
+        let inverts = unknown && snapshot.is_some();
+        self.pin.set_level((lit != inverts).into());
         self.steps = self.steps.saturating_sub(1);
         self.due = now + Duration::from_millis(time_ms);
     }

@@ -9,6 +9,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, Ticker};
 use siskin_control::esc::{Esc, obey};
+use siskin_control::input;
 use siskin_control::mavlink::{Receiver, Request};
 
 use super::clock::now;
@@ -120,7 +121,10 @@ impl MainTask<'_> {
         let now = now();
         self.supervisor.poll(now);
         let snapshot = self.snapshot.read();
-        self.light.poll(now, snapshot.as_ref(), self.esc.light());
+        let telemetry = self.esc.telemetry();
+        let unknown = input::is_unknown(telemetry.signal, telemetry.bad_share);
+        self.light
+            .poll(now, snapshot.as_ref(), self.esc.light(), unknown);
         let Some(snapshot) = snapshot else {
             return false;
         };

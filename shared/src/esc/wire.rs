@@ -65,6 +65,7 @@ impl Esc {
             News::Calibration(Step::Full | Step::Again) => Tune::Calibrating,
             News::Calibration(Step::Done(_)) => Tune::Calibrated,
             News::Identified(_)
+            | News::Unknown
             | News::Lost { armed: false }
             | News::Calibration(Step::Cancelled | Step::Identify) => return,
         };

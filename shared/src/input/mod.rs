@@ -65,6 +65,11 @@ pub struct Heard {
     pub order: Option<Order>,
 }
 
+/// Returns true if a wire carries something, but no signal that is known: one of another kind, or noise.
+pub fn is_unknown(signal: Option<Signal>, bad_share: f32) -> bool {
+    signal.is_none() && bad_share > 0.5
+}
+
 /// One throttle wire, from the decoder to the authority.
 #[derive(Clone, Debug)]
 pub struct Input {
@@ -239,6 +244,7 @@ impl Input {
         let standing = Standing {
             signal: self.signal(now_us),
             armed: self.authority.armed(),
+            unknown: is_unknown(self.signal(now_us), self.bad_share()),
             open: self.authority.refuses() && !self.calibration.is_under_way(),
         };
         self.announcer.next(now_us, standing)

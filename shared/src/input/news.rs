@@ -9,14 +9,18 @@ const APART_US: u64 = 1_000_000;
 
 /// How long throttle must be open before the ESC complains, µs.
 const OPEN_US: u64 = 500_000;
+/// The same of a wire whose signal is not known; plugging it in makes some edges.
+const UNKNOWN_US: u64 = 2_500_000;
 /// Time between two complaints, µs.
-const OPEN_AGAIN_US: u64 = 3_000_000;
+const AGAIN_US: u64 = 3_000_000;
 
 /// News to tell in words or by a tune.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum News {
     /// The wire carries this signal.
     Identified(Signal),
+    /// The wire carries something for a while, but no signal that is known.
+    Unknown,
     /// The signal was lost.
     Lost {
         /// The wire was armed.
@@ -36,6 +40,8 @@ pub(super) struct Standing {
     /// The identified signal, while present.
     pub(super) signal: Option<Signal>,
     pub(super) armed: bool,
+    /// There were edges in the last second, and no frame or pulse in them.
+    pub(super) unknown: bool,
     /// The wire demands throttle without being armed, and it is not a calibration.
     pub(super) open: bool,
 }
@@ -49,8 +55,8 @@ pub(super) struct Announcer {
     loss: Option<bool>,
     lost_us: Option<u64>,
     armed: bool,
-    open_since_us: Option<u64>,
-    open_told_us: Option<u64>,
+    open: Complaint,
+    unknown: Complaint,
     step: Option<Step>,
 }
 
@@ -95,22 +101,35 @@ impl Announcer {
         if let Some(step) = self.step.take() {
             return Some(News::Calibration(step));
         }
-        self.next_open(now_us, standing.open)
+        if self.open.is_due(now_us, standing.open, OPEN_US) {
+            return Some(News::OpenThrottle);
+        }
+        (self.unknown.is_due(now_us, standing.unknown, UNKNOWN_US)).then_some(News::Unknown)
     }
+}
 
-    fn next_open(&mut self, now_us: u64, open: bool) -> Option<News> {
-        if !open {
-            self.open_since_us = None;
-            return None;
+/// Something that is told once it has lasted, and again while it lasts.
+#[derive(Clone, Debug, Default)]
+struct Complaint {
+    since_us: Option<u64>,
+    told_us: Option<u64>,
+}
+
+impl Complaint {
+    // Two callers, each in turn.
+    #[inline(never)]
+    fn is_due(&mut self, now_us: u64, holds: bool, lasts_us: u64) -> bool {
+        if !holds {
+            self.since_us = None;
+            return false;
         }
-        let since_us = *self.open_since_us.get_or_insert(now_us);
-        if now_us.saturating_sub(since_us) < OPEN_US
-            || !is_apart(now_us, self.open_told_us, OPEN_AGAIN_US)
-        {
-            return None;
+        let since_us = *self.since_us.get_or_insert(now_us);
+        let lasted = now_us.saturating_sub(since_us) >= lasts_us;
+        let is_due = lasted && is_apart(now_us, self.told_us, AGAIN_US);
+        if is_due {
+            self.told_us = Some(now_us);
         }
-        self.open_told_us = Some(now_us);
-        Some(News::OpenThrottle)
+        is_due
     }
 }
 

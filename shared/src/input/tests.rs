@@ -201,6 +201,19 @@ fn throttle_open_at_power_up_never_turns_and_says_so() {
 }
 
 #[test]
+fn a_signal_of_no_known_kind_is_told_while_it_lasts() {
+    let mut bench = Bench::new(None);
+    // Frames that break off in the middle, all of them.
+    bench.cut_frames(8_000, 0, 21);
+    let unknown = bench.news.iter().filter(|news| news.1 == News::Unknown);
+    let at_ms: Vec<_> = unknown.map(|news| news.0 / 500).collect();
+    assert_eq!(at_ms, [7, 13], "{:?}", bench.news);
+    bench.news.clear();
+    bench.frames(4_000, 0);
+    assert!(!bench.news.iter().any(|news| news.1 == News::Unknown));
+}
+
+#[test]
 fn a_throttle_that_is_lowered_in_time_is_not_complained_of() {
     let mut bench = Bench::new(Some(DSHOT600));
     for _ in 0..20 {

@@ -20,6 +20,10 @@ pub(super) fn words(news: News) -> Option<(MavSeverity, [&'static str; 2])> {
             MavSeverity::MAV_SEVERITY_NOTICE,
             ["Throttle: signal lost", ""],
         ),
+        News::Unknown => (
+            MavSeverity::MAV_SEVERITY_WARNING,
+            ["Throttle: a signal of no known kind", ""],
+        ),
         News::OpenThrottle => (
             MavSeverity::MAV_SEVERITY_WARNING,
             ["Throttle is open: lower it to arm", ""],
