@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! cargo build -p siskin-firmware --release --target thumbv7em-none-eabihf --features b-g431b-esc1
-//! cargo build -p siskin-firmware --release --target thumbv7em-none-eabihf --features vesc4-f405
+//! cargo build -p siskin-firmware --release --target thumbv7em-none-eabihf --features vesc4-f405-r001
 //! ```
 //!
 //! | part | what it is |
@@ -104,7 +104,12 @@
 //! virtual board.
 #![cfg_attr(not(test), no_std)]
 
-#[cfg(all(feature = "b-g431b-esc1", feature = "vesc4-f405"))]
+#[cfg(any(
+    all(feature = "b-g431b-esc1", feature = "vesc4-f405"),
+    all(feature = "vesc4-f405-r0005", feature = "vesc4-f405-r001"),
+    all(feature = "vesc4-f405-r0005", feature = "vesc4-f405-r005"),
+    all(feature = "vesc4-f405-r001", feature = "vesc4-f405-r005"),
+))]
 compile_error!("choose one board, not two");
 
 // Linked only for its transport.

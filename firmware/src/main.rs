@@ -3,7 +3,9 @@
 #![no_main]
 
 #[cfg(not(any(feature = "b-g431b-esc1", feature = "vesc4-f405")))]
-compile_error!("choose a board: --features b-g431b-esc1 or --features vesc4-f405");
+compile_error!(
+    "choose a board: --features b-g431b-esc1 or, for instance, --features vesc4-f405-r001"
+);
 
 mod handlers;
 mod memory;

@@ -46,7 +46,7 @@ BOARDS = {
         pwm="ADC1_2",
         alarm=None,
     ),
-    "vesc4-f405": Board(
+    "vesc4-f405-r001": Board(
         # Two of its sectors, after the one with the vectors, are the store.
         flash=Region("flash", 0x0800_0000, 1024 * KB, (1024 - 32) * KB),
         memories=(Region("SRAM", 0x2000_0000, 128 * KB, 128 * KB),),

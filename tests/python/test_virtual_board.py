@@ -151,7 +151,7 @@ def test_the_scenario_of_the_readme_holds_and_what_nobody_sees_is_no_failure():
         (("nothing.elf",), "nothing.elf: cannot be read"),
         ((__file__,), "not a 32-bit ELF file"),
         ((VIRTUAL_BOARD,), "not a 32-bit ELF file"),
-        ((IMAGES / "vesc4-f405.elf",), "is not in the flash"),
+        ((IMAGES / "vesc4-f405-r001.elf",), "is not in the flash"),
         ((IMAGE, "--speed", "fast"), "give 0.001 to 1000, max or lockstep"),
     ],
 )

@@ -33,6 +33,7 @@ mod tune;
 use std::io;
 use std::process::ExitCode;
 
+use clap::error::ContextKind;
 use clap::error::ErrorKind::{DisplayHelpOnMissingArgumentOrSubcommand, UnknownArgument};
 use clap::parser::ValueSource;
 use clap::{Arg, CommandFactory, FromArgMatches};
@@ -47,7 +48,9 @@ use session::Session;
 pub fn main() -> ExitCode {
     let cli = match parse() {
         Ok(cli) => cli,
-        Err(e) if e.use_stderr() && e.kind() != DisplayHelpOnMissingArgumentOrSubcommand => {
+        Err(mut e) if e.use_stderr() && e.kind() != DisplayHelpOnMissingArgumentOrSubcommand => {
+            // The most similar name may be that of another board. All of them are listed anyway.
+            e.remove(ContextKind::SuggestedValue);
             eprintln!("siskin: {}", one_line(&e.to_string()));
             return ExitCode::from(2);
         }

@@ -137,11 +137,15 @@ pub const NTC: Ntc = Ntc {
 mod tests {
     use super::*;
 
+    use crate::circuit::vesc4_f405::{R001, R0005, R005};
+
     const GUIDE: &str = include_str!("../../README.md");
+
+    const BOARDS: [Board; 4] = [BOARD, R0005, R001, R005];
 
     #[test]
     fn a_refusal_of_a_dead_time_names_the_least() {
-        for least in [BOARD, super::super::vesc4_f405::BOARD].map(|board| board.least_dead_time) {
+        for least in BOARDS.map(|board| board.least_dead_time) {
             assert!(least.refusal.contains(&format!(" {} ns", least.ns)));
             // After the parameter's name in a text of 50 bytes.
             assert!("PWM_DEADTIME_NS: ".len() + least.refusal.len() <= 50);
@@ -150,7 +154,7 @@ mod tests {
 
     #[test]
     fn limits_are_within_what_the_converters_show_and_named() {
-        for board in [BOARD, super::super::vesc4_f405::BOARD] {
+        for board in BOARDS {
             let shown_a = Board::greatest_phase(board.current_range_a).value;
             let limits = [
                 (board.greatest_phase, shown_a, "A"),

@@ -4,7 +4,7 @@
 //! The image is what this makes:
 //!
 //! ```text
-//! cargo run --release -p siskin -- image --board vesc4-f405 --output target/images
+//! cargo run --release -p siskin -- image --board vesc4-f405-r001 --output target/images
 //! ```
 #![forbid(unsafe_code)]
 
@@ -83,7 +83,7 @@ const SECOND_DMA: [usize; 8] = [56, 57, 58, 59, 60, 68, 69, 70];
 
 /// Returns the linked image, from the start of the flash.
 fn image() -> Vec<u8> {
-    const BOARD: &str = "vesc4-f405";
+    const BOARD: &str = "vesc4-f405-r001";
     let path = made::made(BOARD, "bin");
     made::is_made(BOARD, &path);
     fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))

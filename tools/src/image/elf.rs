@@ -83,12 +83,7 @@ impl Image {
         let found = segments.iter();
         let mut found = found.filter_map(|segment| Some((segment.at, Tag::find(segment.data)?)));
         let (tag_from, tag) = found.next().ok_or("it has no Siskin image tag")?;
-        let board = Board::named(&tag.board).ok_or_else(|| {
-            format!(
-                "made for '{}', a board that this program does not know",
-                tag.board
-            )
-        })?;
+        let board = Board::named(&tag.board)?;
         let flash = board.flash();
         let mut pieces: Vec<Piece> = Vec::new();
         for &Segment { at, data, .. } in &segments {

@@ -9,7 +9,7 @@ use crate::elf::Elf;
 fn a_probe_gets_chip_and_file_and_then_resets() {
     for (board, chip) in [
         ("b-g431b-esc1", "STM32G431CBUx"),
-        ("vesc4-f405", "STM32F405RGTx"),
+        ("vesc4-f405-r001", "STM32F405RGTx"),
     ] {
         let bench = Bench::with(&["probe-rs"]);
         let image = bench.image(board);
@@ -49,12 +49,13 @@ fn one_of_several_probes_can_be_chosen() {
 #[test]
 fn an_image_for_another_board_is_refused_and_nothing_is_written() {
     let bench = Bench::with(&["probe-rs", "dfu-util"]);
-    let image = bench.image("vesc4-f405");
+    let image = bench.image("vesc4-f405-r001");
     for arguments in [&[][..], &["--dfu"]] {
         let wanted = ["flash", &image, "--board", "b-g431b-esc1"];
         let ended = bench.siskin(&[&wanted, arguments].concat());
         assert_eq!((ended.status, ended.out.as_str()), (2, ""));
-        let complaint = format!("siskin: {image}: made for vesc4-f405, not for b-g431b-esc1\n");
+        let complaint =
+            format!("siskin: {image}: made for vesc4-f405-r001, not for b-g431b-esc1\n");
         assert_eq!(ended.err, complaint);
     }
     assert_eq!(bench.asked(), [""; 0]);
@@ -63,12 +64,12 @@ fn an_image_for_another_board_is_refused_and_nothing_is_written() {
 #[test]
 fn over_usb_the_flash_is_read_back() {
     let bench = Bench::with(&["dfu-util"]);
-    let image = bench.image("vesc4-f405");
+    let image = bench.image("vesc4-f405-r001");
     let ended = bench.siskin(&["flash", &image, "--dfu"]);
     assert_eq!((ended.status, ended.err.as_str()), (0, ""));
     assert!(ended.out.contains("release BOOT0"), "{}", ended.out);
     let written = fs::read(bench.path("flash")).expect("downloaded");
-    assert!(written == crate::flash(&Elf::of("vesc4-f405").stamped()));
+    assert!(written == crate::flash(&Elf::of("vesc4-f405-r001").stamped()));
     let asked = bench.asked();
     let loader = "dfu-util --device 0483:df11 --alt 0 --dfuse-address";
     let download = format!("{loader} 0x08000000 --download ");
@@ -82,7 +83,7 @@ fn over_usb_the_flash_is_read_back() {
 fn storage_in_a_hole_of_the_image_is_not_overwritten() {
     let bench = Bench::with(&["dfu-util"]);
     // The code is beyond the second and third sectors.
-    let elf = Elf::with_code_at("vesc4-f405", 0x0800_C000);
+    let elf = Elf::with_code_at("vesc4-f405-r001", 0x0800_C000);
     let path = bench.path("holed.elf");
     fs::write(&path, elf.bytes()).expect("written");
     let ended = bench.siskin(&["flash", path.to_str().expect("UTF-8"), "--dfu"]);
@@ -98,7 +99,7 @@ fn storage_in_a_hole_of_the_image_is_not_overwritten() {
 #[test]
 fn a_flash_that_reads_back_differently_is_reported() {
     let mut bench = Bench::with(&["dfu-util"]);
-    let image = bench.image("vesc4-f405");
+    let image = bench.image("vesc4-f405-r001");
     bench.file("worn", [0xFF; 100]);
     bench.variables.push(("FLASH", "worn".to_owned()));
     let ended = bench.siskin(&["flash", &image, "--dfu"]);
@@ -122,7 +123,12 @@ fn a_board_without_usb_is_not_flashed_over_usb() {
 fn a_program_that_fails_or_is_missing_is_named() {
     for (board, option, program, remedy) in [
         ("b-g431b-esc1", None, "probe-rs", "https://probe.rs"),
-        ("vesc4-f405", Some("--dfu"), "dfu-util", "package dfu-util"),
+        (
+            "vesc4-f405-r001",
+            Some("--dfu"),
+            "dfu-util",
+            "package dfu-util",
+        ),
     ] {
         let mut bench = Bench::with(&[program]);
         let image = bench.image(board);

@@ -27,13 +27,13 @@ fn one_command_writes_elf_bin_and_hex() {
     let bench = Bench::with(&[]);
     let folder = bench.path("new/folder");
     let output = folder.to_str().expect("text");
-    let image = bench.image("vesc4-f405");
+    let image = bench.image("vesc4-f405-r001");
     let ended = bench.siskin(&["image", &image, "-o", output]);
     assert_eq!((ended.status, ended.err.as_str()), (0, ""));
-    let elf = Elf::of("vesc4-f405").stamped();
+    let elf = Elf::of("vesc4-f405-r001").stamped();
     let wanted = flash(&elf);
     for told in [
-        "board    vesc4-f405\n",
+        "board    vesc4-f405-r001\n",
         "version  0.1.0\n",
         "build    0123456789ab+\n",
         &format!(
@@ -41,11 +41,11 @@ fn one_command_writes_elf_bin_and_hex() {
             wanted.len()
         ),
         "reach    1 functions, 4 bytes while the flash is written, none of them in it;",
-        &format!("wrote    {output}/vesc4-f405.hex\n"),
+        &format!("wrote    {output}/vesc4-f405-r001.hex\n"),
     ] {
         assert!(ended.out.contains(told), "{told}: {}", ended.out);
     }
-    let read = |extension| fs::read(folder.join(format!("vesc4-f405.{extension}")));
+    let read = |extension| fs::read(folder.join(format!("vesc4-f405-r001.{extension}")));
     assert_eq!(read("elf").expect("written"), elf.bytes());
     assert_eq!(read("bin").expect("written"), wanted);
 
@@ -123,6 +123,11 @@ fn bad_images() -> Vec<(Vec<u8>, &'static str)> {
         (with(Vec::new()).bytes(), "nothing in it"),
         (untagged.bytes(), "no Siskin image tag"),
         (Elf::of("third").bytes(), "'third'"),
+        // What the feature of a class of boards builds.
+        (
+            Elf::of("vesc4-f405").bytes(),
+            "vesc4-f405-r0005, vesc4-f405-r001, vesc4-f405-r005",
+        ),
         (tagged(0x0801_EFF0).bytes(), "0x0801f000"),
         (tagged(0x1000_0000).bytes(), "0x10000000"),
         (tagged(0xFFFF_FFF0).bytes(), "0xfffffff0"),
@@ -151,7 +156,7 @@ fn both_commands_refuse_a_bad_image_in_one_line() {
 #[test]
 fn a_flipped_bit_of_a_stamped_image_is_refused() {
     let bench = Bench::with(&["probe-rs"]);
-    let stamped = Elf::of("vesc4-f405").stamped().bytes();
+    let stamped = Elf::of("vesc4-f405-r001").stamped().bytes();
     let image = bench.file("image", &stamped);
     assert_eq!(bench.siskin(&["flash", &image]).status, 0);
     let asked = bench.asked();
@@ -173,6 +178,7 @@ fn a_flipped_bit_of_a_stamped_image_is_refused() {
     let ended = bench.siskin(&["flash", &bench.file("image", &damaged)]);
     for named in ["damaged", "check sum", "siskin image"] {
         assert!(ended.err.contains(named), "{named}: {}", ended.err);
+        assert!(!ended.err.contains("similar"), "{}", ended.err);
     }
 }
 
@@ -186,10 +192,15 @@ fn bad_arguments_end_with_one_line() {
         (&["image", &image], "--output"),
         (&["image", "no-such-file", "-o", "x"], "no-such-file"),
         (&["image", "--board", "esc3", "-o", "x"], "b-g431b-esc1"),
+        // Without its shunts' number a VESC is no board.
+        (
+            &["image", "--board", "vesc4-f405", "-o", "x"],
+            "vesc4-f405-r0005, vesc4-f405-r001, vesc4-f405-r005",
+        ),
         (&["image", &image, "-o", &folder], &folder),
         (
-            &["image", &image, "--board", "vesc4-f405", "-o", "x"],
-            "made for b-g431b-esc1, not for vesc4-f405",
+            &["image", &image, "--board", "vesc4-f405-r001", "-o", "x"],
+            "made for b-g431b-esc1, not for vesc4-f405-r001",
         ),
         (&["flash"], "ELF"),
         (&["flash", "no-such-file"], "no-such-file"),
@@ -199,5 +210,6 @@ fn bad_arguments_end_with_one_line() {
         assert_eq!(ended.status, 2, "{arguments:?}: {}", ended.err);
         assert_eq!(ended.err.lines().count(), 1, "{}", ended.err);
         assert!(ended.err.contains(named), "{named}: {}", ended.err);
+        assert!(!ended.err.contains("similar"), "{}", ended.err);
     }
 }
