@@ -205,6 +205,8 @@ impl Mavlink {
     pub fn open(self, baud: u32) -> Uart<'static, Async> {
         let mut config = usart::Config::default();
         config.baudrate = chip::hal_baud(baud);
+        // Noise on an input without a partner, as with the ST-LINK's half broken off, would be bytes.
+        config.rx_pull = Pull::Up;
         let ((rx, tx), (out, into)) = (self.pins, self.dma);
         Uart::new(self.uart, rx, tx, out, into, Interrupts, config)
             .expect("170 MHz divides to every rate of the parameter")

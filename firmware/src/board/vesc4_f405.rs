@@ -182,6 +182,8 @@ impl Mavlink {
     pub fn open(self, baud: u32) -> Uart<'static, Async> {
         let mut config = usart::Config::default();
         config.baudrate = baud;
+        // Noise on an input with nothing plugged in would be bytes.
+        config.rx_pull = Pull::Up;
         let ((rx, tx), (out, into)) = (self.pins, self.dma);
         Uart::new(self.uart, rx, tx, out, into, Interrupts, config)
             .expect("84 MHz divides to every rate of the parameter")

@@ -58,6 +58,8 @@ const ADC1_SR: u32 = 0x4001_2000;
 const USART6_SR: u32 = 0x4001_1400;
 const SENT: u32 = 0b11 << 6;
 const USART6_DR: u32 = 0x4001_1404;
+/// Port C's pulls; the serial line's input is PC7.
+const GPIOC_PUPDR: u32 = 0x4002_080c;
 /// The gate driver's nFAULT is PC12, and its enable PC10.
 const GPIOC_IDR: u32 = 0x4002_0810;
 const GPIOC_BSRR: u32 = 0x4002_0818;
@@ -275,6 +277,18 @@ fn revision_a_does_not_read_ahead() {
     let access = flash_access(REVISION_A);
     let wanted = CODE_CACHE | CONSTANTS_CACHE;
     assert_eq!(access & (wanted | PREFETCH), wanted, "{access:#x}");
+}
+
+/// Returns the two bits of a pin's pull: 1 is up.
+fn pull(word: u32, pin: u32) -> u32 {
+    word >> (2 * pin) & 0b11
+}
+
+#[test]
+fn the_serial_input_rests_high_with_nothing_plugged_in() {
+    let periods = |registers: &Registers| registers.periods.len() > 10;
+    let registers = run(&image(), REVISION_1, 0..0, periods);
+    assert_eq!(pull(registers.word(GPIOC_PUPDR), 7), 1);
 }
 
 /// The second DMA corrupts data if it serves an AHB peripheral, such as a port, as well as one on APB2 (ES0182,
