@@ -228,6 +228,9 @@ impl Kiss {
     pub fn open(self) -> UartTx<'static, Async> {
         let mut config = usart::Config::default();
         config.baudrate = chip::hal_baud(KISS_HZ);
+        // A sensor on this pin is an open collector, and would short a high output. With 100 pF of wire the chip's
+        // pull-up of 40 kΩ alone (data sheet, I/O static characteristics) is half up after 2.8 µs, of a bit's 8.7 µs.
+        config.tx_config = usart::OutputConfig::OpenDrainPullUp;
         UartTx::new(self.uart, self.pin, self.dma, Interrupts, config)
             .expect("170 MHz divides to 115200 baud")
     }

@@ -5,7 +5,7 @@
 //! | [`boot`] | it starts, answers by MAVLink, and two runs are equal |
 //! | [`throttle`] | DShot and pulses turn the motor, and each frame is answered on time |
 //! | [`replies`] | a flight controller's decoder reads each reply at DShot300, 600 and 1200 |
-//! | [`pins`] | pins that outside wires reach rest high, and nothing drives against a sensor |
+//! | [`pins`] | pins that wires from outside reach rest high, and nothing drives against a sensor |
 //! | [`storage`] | what is stored survives power cuts and resets during any write and erase |
 //! | [`readings`] | shifted grounds and the chip's errors do not show in its readings |
 //! | [`self_test`] | a sound board passes its self-test, and each defect is named |

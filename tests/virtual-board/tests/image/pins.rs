@@ -22,6 +22,18 @@ fn the_serial_input_rests_high_without_a_partner() {
     assert_eq!(two_bits(&mut board, PUPDR, 4), PULLED_UP);
 }
 
+/// The first Hall sensor's pin, which has the telemetry while no sensor is chosen: a sensor plugged in there pulls it
+/// low by its open collector, and a high output would be a short through the sensor.
+#[test]
+fn telemetry_does_not_drive_high_against_a_hall_sensor() {
+    let mut board = Board::new(&image(), &[]);
+    board.run(30 * MS);
+    assert_eq!(two_bits(&mut board, MODER, 6), ALTERNATE);
+    assert_eq!(two_bits(&mut board, PUPDR, 6), PULLED_UP);
+    let open_drains = read(&mut board, OTYPER);
+    assert_eq!(open_drains & 1 << 6, 1 << 6, "{open_drains:#x}");
+}
+
 fn two_bits(board: &mut Board, register: u32, pin: u32) -> u32 {
     read(board, register) >> (2 * pin) & 0b11
 }
