@@ -38,6 +38,9 @@ const LINE_BYTES: usize = 512;
 #[inline(never)] // its stack is free for what comes next
 pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) -> MainTask<'_> {
     tell(esc, fit);
+    if let Some(text) = chip::clock_trouble() {
+        esc.warn_of(text);
+    }
     recall_rest(esc, &mut hardware.flash);
     let mut port = open_port(esc.params());
     let reset = chip::take_reset();

@@ -30,7 +30,10 @@ const SRAM_BYTES: usize = 0x2_0000;
 
 /// Registers (RM0090), and the bits that matter here.
 const RCC_CR: u32 = 0x4002_3800;
-const SWITCHED_ON: u32 = 1 | 1 << 16 | 1 << 24;
+const CRYSTAL_ON: u32 = 1 << 16;
+const CRYSTAL_WATCHED: u32 = 1 << 19;
+const SWITCHED_ON: u32 = 1 | CRYSTAL_ON | 1 << 24;
+const RCC_PLLCFGR: u32 = 0x4002_3804;
 const RCC_CFGR: u32 = 0x4002_3808;
 const SELECTED: u32 = 0b11;
 const RCC_APB2ENR: u32 = 0x4002_3844;
@@ -98,10 +101,21 @@ struct Driver {
     enabled: bool,
 }
 
+/// The crystal's defects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Crystal {
+    Sound,
+    /// It does not start.
+    Dead,
+    /// It stops in this control period.
+    Stops(usize),
+}
+
 /// The chip's registers.
 #[derive(Clone)]
 struct Registers {
     revision: u32,
+    crystal: Crystal,
     words: HashMap<u32, u32>,
     lines: Lines,
     now: Cycles,
@@ -123,6 +137,9 @@ impl Registers {
     fn word(&self, address: u32) -> u32 {
         let word = self.words.get(&address).copied().unwrap_or(0);
         match address {
+            RCC_CR if self.crystal == Crystal::Dead => {
+                word | (word & SWITCHED_ON & !CRYSTAL_ON) << 1
+            }
             RCC_CR | RCC_CSR => word | (word & SWITCHED_ON) << 1,
             RCC_CFGR => word | (word & SELECTED) << 2,
             PWR_CSR => word | SCALED,
@@ -217,6 +234,10 @@ impl Surroundings for Registers {
                 heard: self.word(EXTI_IMR) & FAULT != 0,
                 enabled: self.driver_enabled,
             });
+            let stops = self.crystal == Crystal::Stops(self.periods.len());
+            if stops && self.word(RCC_CR) & CRYSTAL_WATCHED != 0 {
+                self.lines.non_maskable = true;
+            }
         }
     }
 }
@@ -228,6 +249,19 @@ fn run(
     alarm: Range<usize>,
     ends: fn(&Registers) -> bool,
 ) -> Registers {
+    let (registers, stop) = run_with(Crystal::Sound, bytes, revision, alarm, ends);
+    assert_eq!(stop, Stop::Asked);
+    registers
+}
+
+/// Likewise with this crystal; also returns why it stopped.
+fn run_with(
+    crystal: Crystal,
+    bytes: &[u8],
+    revision: u32,
+    alarm: Range<usize>,
+    ends: fn(&Registers) -> bool,
+) -> (Registers, Stop) {
     let flash = Memory::new(FLASH, FLASH_BYTES, 0xff);
     flash.load(FLASH, bytes);
     let mapped = |memory, writable| Mapped { memory, writable };
@@ -238,6 +272,7 @@ fn run(
     ];
     let registers = Registers {
         revision,
+        crystal,
         // The internal oscillator.
         words: HashMap::from([(RCC_CR, 1)]),
         lines: Lines::default(),
@@ -252,8 +287,8 @@ fn run(
     };
     let mut processor = Processor::new(registers, &memories);
     processor.reset(FLASH);
-    assert_eq!(processor.run(), Stop::Asked);
-    processor.surroundings().clone()
+    let stop = processor.run();
+    (processor.surroundings().clone(), stop)
 }
 
 /// Starts the image on a chip of this revision, and returns how its flash is read from then on.
@@ -289,6 +324,45 @@ fn the_serial_input_rests_high_with_nothing_plugged_in() {
     let periods = |registers: &Registers| registers.periods.len() > 10;
     let registers = run(&image(), REVISION_1, 0..0, periods);
     assert_eq!(pull(registers.word(GPIOC_PUPDR), 7), 1);
+}
+
+/// Returns the PLL's source, which is the crystal if true, and its frequency in MHz with that source (RM0090,
+/// RCC_PLLCFGR).
+fn pll(word: u32) -> (bool, u32) {
+    let from_crystal = word >> 22 & 1 != 0;
+    let source_mhz = if from_crystal { 8 } else { 16 };
+    let (divider, factor) = (word & 0x3f, word >> 6 & 0x1ff);
+    let output = 2 * ((word >> 16 & 0b11) + 1);
+    (from_crystal, source_mhz * factor / divider / output)
+}
+
+/// The crystal gives the clock. One that does not start within 0.1 s is left out, and everything else is as with it.
+#[test]
+fn a_crystal_that_does_not_start_is_replaced() {
+    for (crystal, has_crystal) in [(Crystal::Sound, true), (Crystal::Dead, false)] {
+        let periods = |registers: &Registers| registers.periods.len() > 10;
+        let (registers, stop) = run_with(crystal, &image(), REVISION_1, 0..0, periods);
+        assert!(registers.periods.len() > 10, "{crystal:?}: {stop:?}");
+        assert_eq!(pll(registers.word(RCC_PLLCFGR)), (has_crystal, 168));
+        let control = registers.word(RCC_CR);
+        let used = control & (CRYSTAL_ON | CRYSTAL_WATCHED);
+        let wanted = if has_crystal {
+            CRYSTAL_ON | CRYSTAL_WATCHED
+        } else {
+            0
+        };
+        assert_eq!(used, wanted, "{crystal:?}: {control:#x}");
+    }
+}
+
+/// Without it the chip runs ten times as slowly, and so does the PWM: the bridge must not go on.
+#[test]
+fn a_crystal_that_stops_turns_the_bridge_off_and_restarts() {
+    let crystal = Crystal::Stops(100);
+    let periods = |registers: &Registers| registers.periods.len() > 110;
+    let (registers, stop) = run_with(crystal, &image(), REVISION_1, 0..0, periods);
+    assert_eq!((registers.periods.len(), stop), (100, Stop::Reset));
+    assert_eq!(registers.word(TIM1_BDTR) & OUTPUTS_ON, 0);
 }
 
 /// The second DMA corrupts data if it serves an AHB peripheral, such as a port, as well as one on APB2 (ES0182,

@@ -1,15 +1,15 @@
 //! STM32F405.
 
+mod clock;
 pub(crate) mod pages;
 
+use embassy_stm32::Peripherals;
 use embassy_stm32::interrupt;
 use embassy_stm32::pac::adc::Adc;
 use embassy_stm32::pac::adc::regs::Sr;
 use embassy_stm32::pac::{DBGMCU, EXTI, FLASH, RCC, SYSCFG};
-use embassy_stm32::rcc::{
-    AHBPrescaler, APBPrescaler, Pll, PllMul, PllPDiv, PllPreDiv, PllSource, Sysclk,
-};
-use embassy_stm32::{Config, Peripherals};
+
+pub(crate) use clock::clock_trouble;
 
 use super::Reset;
 
@@ -39,7 +39,8 @@ pub(crate) fn acknowledge(converters: &[Adc; 2]) {
 
 /// Starts the chip.
 pub(crate) fn start() -> Peripherals {
-    let peripherals = embassy_stm32::init(clock());
+    let peripherals = embassy_stm32::init(clock::config());
+    clock::watch();
     // The HAL wrote the whole register with nothing but the wait states (embassy-stm32 0.6). A fetch of four
     // instructions or more then takes six clocks, most of which caches and prefetch save (RM0090, 3.5).
     let id = DBGMCU.idcode().read();
@@ -57,25 +58,6 @@ const STM32F405: u16 = 0x413;
 
 /// Revision A according to RM0090.
 const REVISION_A: u16 = 0x1000;
-
-/// 168 MHz from the internal 16 MHz, since no source is sure about this board's crystal.
-fn clock() -> Config {
-    let mut config = Config::default();
-    config.rcc.hsi = true;
-    config.rcc.pll_src = PllSource::HSI;
-    config.rcc.pll = Some(Pll {
-        prediv: PllPreDiv::DIV8,
-        mul: PllMul::MUL168,
-        divp: Some(PllPDiv::DIV2),
-        divq: None,
-        divr: None,
-    });
-    config.rcc.sys = Sysclk::PLL1_P;
-    config.rcc.ahb_pre = AHBPrescaler::DIV1;
-    config.rcc.apb1_pre = APBPrescaler::DIV4;
-    config.rcc.apb2_pre = APBPrescaler::DIV2;
-    config
-}
 
 /// Lets a falling edge on a pin of port C, 10 to 15, request [`ALARM`].
 pub(crate) fn detect(pin: usize) {

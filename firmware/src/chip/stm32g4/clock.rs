@@ -72,6 +72,11 @@ fn speed_up() {
     RCC.cfgr().modify(|w| w.set_hpre(AHBPrescaler::DIV1));
 }
 
+/// Returns nothing: the internal oscillator is the only one.
+pub(crate) const fn clock_trouble() -> Option<&'static str> {
+    None
+}
+
 /// Converts a serial baud rate for the HAL, which derives its divider from its own clock.
 pub(crate) const fn hal_baud(rate_hz: u32) -> u32 {
     // `TEL_BAUD` goes up to 921 600, where the HAL divides by 184 and the rate is 0.25 % off.

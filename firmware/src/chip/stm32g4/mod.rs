@@ -13,7 +13,7 @@ use embassy_stm32::pac::adc::Adc;
 
 use super::Reset;
 
-pub(crate) use clock::{hal_baud, start};
+pub(crate) use clock::{clock_trouble, hal_baud, start};
 
 /// Clock of the timers.
 pub const TIMER_HZ: u32 = 170_000_000;
