@@ -126,6 +126,8 @@ pub mod damaged;
 #[cfg(any(board, test))]
 mod edges;
 pub mod exchange;
+#[cfg(any(board, test))]
+mod hall;
 pub mod image;
 pub mod interrupt;
 pub mod last_words;

@@ -29,6 +29,7 @@ use crate::circuit::b_g431b_esc1::{
     BIAS_V, RATING_A, SHUNT_DIVIDER, SHUNT_OHM, V_PER_COUNT, ZERO_COUNTS,
 };
 use crate::circuit::trip_level::TripCircuit;
+use crate::hall;
 use crate::priority;
 use crate::storage::Storage;
 
@@ -41,6 +42,9 @@ pub(crate) const SAMPLING_CLOCKS: u16 = 50;
 
 /// The comparators break the PWM.
 pub(crate) const BREAKS: bool = true;
+
+/// KISS telemetry takes a Hall sensor's pin.
+pub(crate) const KISS_TAKES_A_SENSOR: bool = true;
 
 /// No gate driver with a fault output.
 pub(crate) const GATE_DRIVER: Option<GateDriverPins> = None;
@@ -56,7 +60,7 @@ pub(crate) const WIRING: Wiring = Wiring {
     rises: false,
     terminals: [Slot(1, 1), Slot(1, 2), Slot(0, 2)],
     bus: Slot(0, 3),
-    hall: Some(6),
+    hall: hall::Pins([hall::Pin::B(6), hall::Pin::B(7), hall::Pin::B(8)]),
 };
 
 /// Pins with a fixed function. The analogue ones need no set-up, including the op-amps' inverting inputs PA3,

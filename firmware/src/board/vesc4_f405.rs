@@ -32,6 +32,7 @@ use super::parts::parts;
 use super::wiring::{GateDriverPins, Slot, Wiring};
 use crate::chip::{self, capture};
 use crate::circuit::vesc4_f405::ZERO_COUNTS;
+use crate::hall;
 use crate::priority;
 use crate::storage::Storage;
 
@@ -44,6 +45,9 @@ pub(crate) const SAMPLING_CLOCKS: u16 = 120;
 /// Nothing breaks the PWM: nFAULT is at PC12, and the timer's break at PA6 and PB12 only (DS8626, alternate
 /// functions).
 pub(crate) const BREAKS: bool = false;
+
+/// KISS telemetry has a pin of its own.
+pub(crate) const KISS_TAKES_A_SENSOR: bool = false;
 
 /// Pins on port C.
 pub(crate) const GATE_DRIVER: Option<GateDriverPins> = Some(GateDriverPins {
@@ -62,8 +66,9 @@ pub(crate) const WIRING: Wiring = Wiring {
     rises: true,
     terminals: [Slot(0, 1), Slot(1, 1), Slot(1, 2)],
     bus: Slot(0, 2),
-    // The serial line uses their pins.
-    hall: None,
+    // The second and third are swapped like the phases. As in the VESC firmware from the 4.5 on (`hw_45.h` to
+    // `hw_410.h`); the 4.0 had the third at PB8.
+    hall: hall::Pins([hall::Pin::B(6), hall::Pin::C(11), hall::Pin::B(7)]),
 };
 
 bind_interrupts!(struct Interrupts {
@@ -248,6 +253,12 @@ impl Hardware {
             ComplementaryPwmPin::<TIM1, _>::new_with_config(p.PB14, gate),
             PwmPin::<TIM1, _>::new_with_config(p.PA10, gate),
             ComplementaryPwmPin::<TIM1, _>::new_with_config(p.PB15, gate),
+        ));
+        // Hall sensors are open-collector; without them the pull-ups read 7.
+        mem::forget((
+            Input::new(p.PB6, Pull::Up),
+            Input::new(p.PB7, Pull::Up),
+            Input::new(p.PC11, Pull::Up),
         ));
         // The amplifiers measure: calibration mode is off.
         mem::forget(Output::new(p.PB12, Level::Low, Speed::Low));

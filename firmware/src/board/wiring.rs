@@ -1,5 +1,7 @@
 //! Describes how a board's signals are connected.
 
+use crate::hall;
+
 /// Where a reading is: a converter and the rank in its sequence.
 #[derive(Clone, Copy)]
 pub(crate) struct Slot(pub(crate) usize, pub(crate) usize);
@@ -16,8 +18,9 @@ pub(crate) struct Wiring {
     pub(crate) terminals: [Slot; 3],
     /// Supply voltage.
     pub(crate) bus: Slot,
-    /// First of three consecutive Hall sensor pins on port B, if there are any.
-    pub(crate) hall: Option<u8>,
+    /// Pins of the Hall sensors. Sensor and phase of a number belong together: a builder expects the first sensor
+    /// at the first output.
+    pub(crate) hall: hall::Pins,
 }
 
 /// Pins of a gate driver on port C.

@@ -105,7 +105,7 @@ fn EXTI15_10() {
     let registers = Registers::CHIP;
     turn_off(registers.timer);
     if let Some(pins) = GATE_DRIVER {
-        disable(registers.gate_driver, pins);
+        disable(registers.port_c, pins);
         ALARMED.store(true, Ordering::Relaxed);
         chip::heard(pins.fault);
     }

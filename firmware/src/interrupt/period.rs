@@ -61,7 +61,7 @@ impl Interrupt {
         Self {
             registers,
             pwm: end.with_config(|config| Pwm::new(registers.timer, Timing::new(config, TIMER_HZ))),
-            gate_driver: GateDriver::new(registers.gate_driver),
+            gate_driver: GateDriver::new(registers.port_c),
             state: end.with_config(State::new),
             found: None,
             trip: Setpoint::Fault(Fault::OverCurrent),

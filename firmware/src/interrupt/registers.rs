@@ -16,10 +16,10 @@ pub struct Registers {
     pub(crate) timer: TimAdv,
     /// Converters triggered by the timer.
     pub(crate) converters: [Adc; 2],
-    /// Port of the Hall sensors.
-    pub(crate) hall: Gpio,
-    /// Port of the gate driver.
-    pub(crate) gate_driver: Gpio,
+    /// Port B: Hall sensors.
+    pub(crate) port_b: Gpio,
+    /// Port C: the gate driver and, on some boards, a Hall sensor.
+    pub(crate) port_c: Gpio,
 }
 
 impl Registers {
@@ -27,8 +27,8 @@ impl Registers {
     pub const CHIP: Self = Self {
         timer: bridge::TIMER,
         converters: [ADC1, ADC2],
-        hall: GPIOB,
-        gate_driver: GPIOC,
+        port_b: GPIOB,
+        port_c: GPIOC,
     };
 }
 
@@ -43,8 +43,8 @@ type Block = [AtomicU32; WORDS];
 pub struct Stand {
     timer: Block,
     pub(super) converters: [Block; 2],
-    pub(super) hall: Block,
-    gate_driver: Block,
+    pub(super) port_b: Block,
+    pub(super) port_c: Block,
 }
 
 impl Stand {
@@ -57,8 +57,8 @@ impl Stand {
         Self {
             timer: [const { AtomicU32::new(0) }; WORDS],
             converters: [const { [const { AtomicU32::new(0) }; WORDS] }; 2],
-            hall: [const { AtomicU32::new(0) }; WORDS],
-            gate_driver: [const { AtomicU32::new(!0) }; WORDS],
+            port_b: [const { AtomicU32::new(0) }; WORDS],
+            port_c: [const { AtomicU32::new(!0) }; WORDS],
         }
     }
 
@@ -73,8 +73,8 @@ impl Stand {
                     Adc::from_ptr(pointer(&self.converters[0])),
                     Adc::from_ptr(pointer(&self.converters[1])),
                 ],
-                hall: Gpio::from_ptr(pointer(&self.hall)),
-                gate_driver: Gpio::from_ptr(pointer(&self.gate_driver)),
+                port_b: Gpio::from_ptr(pointer(&self.port_b)),
+                port_c: Gpio::from_ptr(pointer(&self.port_c)),
             }
         }
     }

@@ -24,10 +24,11 @@ pub(crate) fn sample(registers: &Registers) -> Sample {
         Some(slot) if WIRING.rises => counts(reading(slot) - WIRING.zero),
         Some(slot) => counts(WIRING.zero - reading(slot)),
     };
-    let hall = match WIRING.hall {
-        // Without sensors their pull-ups read 7.
-        None => 7,
-        Some(pin) => (registers.hall.idr().read().0 >> pin) as u8 & 7,
+    let port_b = registers.port_b.idr().read().0;
+    let port_c = if WIRING.hall.are_on_c() {
+        registers.port_c.idr().read().0
+    } else {
+        0
     };
     // Unrolled: a loop would keep the bounds checks of the ranks.
     let [a, b, c] = WIRING.currents;
@@ -40,7 +41,7 @@ pub(crate) fn sample(registers: &Registers) -> Sample {
             counts(reading(at_b)),
             counts(reading(at_c)),
         ],
-        hall,
+        hall: WIRING.hall.code(port_b, port_c),
     }
 }
 
@@ -67,8 +68,10 @@ impl Stand {
         for (Slot(converter, rank), counts) in readings(sample) {
             self.converters[converter][READINGS_AT_WORD + rank].store(counts, Ordering::Relaxed);
         }
-        let hall = u32::from(sample.hall) << WIRING.hall.unwrap_or(0);
-        // GPIO's IDR is at 0x10.
-        self.hall[0x10 / 4].store(hall, Ordering::Relaxed);
+        // GPIO's IDR is at 0x10; all other pins are high, which is no alarm.
+        let levels = WIRING.hall.show(sample.hall, [!0; 2]);
+        for (port, level) in [&self.port_b, &self.port_c].into_iter().zip(levels) {
+            port[0x10 / 4].store(level, Ordering::Relaxed);
+        }
     }
 }

@@ -20,7 +20,7 @@ use super::throttle::{Capture, Listener, Port, Replier};
 use super::trouble::Teller;
 use super::{kiss, mavlink, throttle};
 use crate::board::wire::TICK_HZ;
-use crate::board::{BOARD, Bridge, Converters, Hardware};
+use crate::board::{BOARD, Bridge, Converters, Hardware, KISS_TAKES_A_SENSOR};
 use crate::exchange::{InterruptEnd, SnapshotReader};
 use crate::storage::{Storage, range};
 use crate::{chip, exchange, interrupt, last_words};
@@ -57,8 +57,7 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
     }
     let pwm_hz = esc.params().get(ParamId::PwmFreqHz);
     let baud = esc.params().get(ParamId::TelBaud) as u32;
-    // On some boards Hall sensors share a pin with the serial line.
-    let has_hall_sensors = esc.params().chosen(CtlObserver::Hall);
+    let kiss_is_free = !(KISS_TAKES_A_SENSOR && esc.params().chosen(CtlObserver::Hall));
 
     let stale_periods = (pwm_hz * STALE_S) as u32;
     let ends = exchange::open(stale_periods).expect("opened here and nowhere else");
@@ -82,7 +81,7 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
 
     let once = "spawned here and nowhere else";
     spawner.spawn(mavlink::transmit(out).expect(once));
-    if !has_hall_sensors {
+    if kiss_is_free {
         spawner.spawn(kiss::transmit(hardware.kiss.open()).expect(once));
     }
     MainTask {

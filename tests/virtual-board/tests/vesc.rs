@@ -61,8 +61,10 @@ const ADC1_SR: u32 = 0x4001_2000;
 const USART6_SR: u32 = 0x4001_1400;
 const SENT: u32 = 0b11 << 6;
 const USART6_DR: u32 = 0x4001_1404;
-/// Port C's pulls; the serial line's input is PC7.
+/// The ports' pulls.
+const GPIOB_PUPDR: u32 = 0x4002_040c;
 const GPIOC_PUPDR: u32 = 0x4002_080c;
+const GPIOB_IDR: u32 = 0x4002_0410;
 /// The gate driver's nFAULT is PC12, and its enable PC10.
 const GPIOC_IDR: u32 = 0x4002_0810;
 const GPIOC_BSRR: u32 = 0x4002_0818;
@@ -126,6 +128,8 @@ struct Registers {
     /// The control periods in which the gate driver's alarm is low.
     alarm: Range<usize>,
     driver_enabled: bool,
+    /// How often port B, with two Hall sensors, was read.
+    hall_reads: usize,
     outputs_were_on: bool,
     /// What the serial line has sent.
     sent: Vec<u8>,
@@ -178,6 +182,7 @@ impl Surroundings for Registers {
     }
 
     fn read(&mut self, address: u32, width: Width) -> Result<u32, BusError> {
+        self.hall_reads += usize::from(address == GPIOB_IDR);
         let word = self.word(address & !3) >> (8 * (address & 3));
         Ok(match width {
             Width::Byte => word & 0xff,
@@ -281,6 +286,7 @@ fn run_with(
         periods: Vec::new(),
         alarm,
         driver_enabled: false,
+        hall_reads: 0,
         outputs_were_on: false,
         sent: Vec::new(),
         ends,
@@ -320,10 +326,16 @@ fn pull(word: u32, pin: u32) -> u32 {
 }
 
 #[test]
-fn the_serial_input_rests_high_with_nothing_plugged_in() {
+fn inputs_rest_high_with_nothing_plugged_in() {
     let periods = |registers: &Registers| registers.periods.len() > 10;
     let registers = run(&image(), REVISION_1, 0..0, periods);
-    assert_eq!(pull(registers.word(GPIOC_PUPDR), 7), 1);
+    let (port_b, port_c) = (registers.word(GPIOB_PUPDR), registers.word(GPIOC_PUPDR));
+    // The serial line's, and Hall sensor 3's.
+    assert_eq!([7, 11].map(|pin| pull(port_c, pin)), [1; 2]);
+    // Hall sensors 1 and 2.
+    assert_eq!([6, 7].map(|pin| pull(port_b, pin)), [1; 2]);
+    // In each period.
+    assert!(registers.hall_reads >= registers.periods.len() - 1);
 }
 
 /// Returns the PLL's source, which is the crystal if true, and its frequency in MHz with that source (RM0090,
