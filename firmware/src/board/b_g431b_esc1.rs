@@ -193,6 +193,12 @@ pub struct Bridge {
 /// |---|---|---|---|---|
 /// | first | current a −0.15 to 0.15 | current c 0.44 to 0.74 | terminal c 1.03 to 1.61 | supply 1.90 to 3.02 |
 /// | second | current b −0.15 to 0.15 | terminal a 0.44 to 1.02 | terminal b 1.31 to 1.89 | |
+///
+/// In the 0.59 µs after a and b, c changes by −(e + R·i)/L: 2.4 % of itself in the bench motor at 6000 rpm (virtual
+/// board). A third of that is in the current vector. It stays there: a c made of the other two would have none of it,
+/// but √2 of the vector's noise. With their sum zero by construction no sensor could be seen to drift, a short in c
+/// would be the comparator's alone, and where a phase is off, what its high side's diode carries would be missing in
+/// the other two.
 pub struct Converters {
     _private: (),
 }
