@@ -7,8 +7,10 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use core::task::Poll;
 
 use embassy_stm32::pac::timer::TimGp32;
-use embassy_stm32::pac::timer::vals::{CcmrInputCcs, FilterValue};
+use embassy_stm32::pac::timer::vals::CcmrInputCcs;
 use embassy_sync::waitqueue::AtomicWaker;
+
+use super::EDGE_FILTER;
 
 /// The alarm's channel; edges use the first and second.
 const ALARM: usize = 2;
@@ -61,8 +63,7 @@ pub(crate) fn capture_on(timer: TimGp32, channel: usize, pin_channel: usize) {
                 CcmrInputCcs::TI3
             },
         );
-        // Four samples at the timer's own clock: rejects spikes shorter than 24 ns (48 ns on the F405).
-        w.set_icf(channel, FilterValue::FCK_INT_N4);
+        w.set_icf(channel, EDGE_FILTER);
     });
 }
 

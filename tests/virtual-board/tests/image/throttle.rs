@@ -6,6 +6,7 @@ use crate::common::{
 use crate::flight_controller::{Exchange, FlightController};
 use mavlink::dialects::ardupilotmega::{PARAM_REQUEST_LIST_DATA, PARAM_VALUE_DATA};
 use siskin_control::answer::{REPLY_DELAY_NS, gcr};
+use siskin_emulator::machine::Machine as _;
 use siskin_vboard::chip::Cause;
 
 /// Returns the period in a reply, µs: `eeemmmmmmmmm`, m·2^e; `None` at standstill.
@@ -179,6 +180,45 @@ fn a_sender_whose_clock_is_off_is_answered_at_its_rate() {
         assert!(texts.iter().any(|text| text == name), "{texts:?}");
         assert!(late >= 398, "{bit}: {late}");
     }
+}
+
+/// Plays 200 ms of DShot frames of zero throttle with a telemetry request, at 4 kHz: bits of these lengths, a zero and a
+/// one's high levels, and in the middle of each low level a spike.
+fn found_out([bit_ns, zero_ns, one_ns]: [u32; 3], spike_ns: u32) -> Vec<String> {
+    let mut board = Board::new(&image(), &[]);
+    // Raw levels, high at first (`emulator/README.md`).
+    let mut frame = vec![255, 1];
+    for bit in (0..16).rev() {
+        let high_ns = if 0x11_u16 >> bit & 1 != 0 {
+            one_ns
+        } else {
+            zero_ns
+        };
+        let before_ns = (bit_ns - high_ns - spike_ns) / 2;
+        let after_ns = bit_ns - high_ns - spike_ns - before_ns;
+        let levels = if spike_ns > 0 {
+            vec![high_ns, before_ns, spike_ns, after_ns]
+        } else {
+            vec![high_ns, bit_ns - high_ns]
+        };
+        frame.extend(levels.into_iter().flat_map(u32::to_le_bytes));
+    }
+    for _ in 0..800 {
+        let now_ns = board.now_ns();
+        board.board.wire(0).play(now_ns, &frame).expect("a frame");
+        board.run(250 * US);
+    }
+    board.heard.texts()
+}
+
+/// Of a spike of 80 ns nothing is seen, such as each switching edge rings in beside the wire; the shortest level that
+/// is DShot's is, and with a tenth to spare.
+#[test]
+fn a_spike_on_the_wire_is_no_edge_but_the_shortest_level_is() {
+    let texts = found_out([1_667, 625, 1_250], 80);
+    assert!(texts.contains(&"Throttle: DShot600".into()), "{texts:?}");
+    let texts = found_out([833, 280, 560], 0);
+    assert!(texts.contains(&"Throttle: DShot1200".into()), "{texts:?}");
 }
 
 /// The power-up tunes, a start, a stop that outlasts the drivers' supplies, and another start: all begin with
