@@ -8,6 +8,8 @@
 //! ```
 #![forbid(unsafe_code)]
 
+#[path = "vesc/chip.rs"]
+mod chip;
 #[path = "image/common/made.rs"]
 mod made;
 
@@ -15,77 +17,10 @@ use std::collections::HashMap;
 use std::fs;
 use std::ops::Range;
 
-use siskin_vboard::memory::Memory;
-use siskin_vboard::processor::{
-    BusError, HandlerEvent, Lines, Mapped, Processor, Stop, Surroundings, Width,
-};
-use siskin_vboard::time::Cycles;
+use chip::*;
+use siskin_vboard::processor::Stop;
 
-const FLASH: u32 = 0x0800_0000;
-const FLASH_BYTES: usize = 0x10_0000;
-const CCM: u32 = 0x1000_0000;
-const CCM_BYTES: usize = 0x1_0000;
-const SRAM: u32 = 0x2000_0000;
-const SRAM_BYTES: usize = 0x2_0000;
-
-/// Registers (RM0090), and the bits that matter here.
-const RCC_CR: u32 = 0x4002_3800;
-const CRYSTAL_ON: u32 = 1 << 16;
-const CRYSTAL_WATCHED: u32 = 1 << 19;
-const SWITCHED_ON: u32 = 1 | CRYSTAL_ON | 1 << 24;
-const RCC_PLLCFGR: u32 = 0x4002_3804;
-const RCC_CFGR: u32 = 0x4002_3808;
-const SELECTED: u32 = 0b11;
-const RCC_APB2ENR: u32 = 0x4002_3844;
-const TIM1: u32 = 1;
-const TIM1_CR1: u32 = 0x4001_0000;
-const DOWN: u32 = 1 << 4;
-const TIM1_SR: u32 = 0x4001_0010;
-const UPDATED: u32 = 1;
-const TIM1_BDTR: u32 = 0x4001_0044;
-const OUTPUTS_ON: u32 = 1 << 15;
-const RCC_CSR: u32 = 0x4002_3874;
-const PWR_CSR: u32 = 0x4000_7004;
-const SCALED: u32 = 1 << 14;
-const FLASH_ACR: u32 = 0x4002_3c00;
-const WAIT_STATES: u32 = 0b111;
-const PREFETCH: u32 = 1 << 8;
-const CODE_CACHE: u32 = 1 << 9;
-const CONSTANTS_CACHE: u32 = 1 << 10;
-const DBGMCU_IDCODE: u32 = 0xe004_2000;
-
-/// The time driver's timer counts microseconds.
-const TIM4_CNT: u32 = 0x4000_0824;
-const CYCLES_A_US: Cycles = 168;
-const ADC1_SR: u32 = 0x4001_2000;
-const USART6_SR: u32 = 0x4001_1400;
-const SENT: u32 = 0b11 << 6;
-const USART6_DR: u32 = 0x4001_1404;
-/// The ports' pulls.
-const GPIOB_PUPDR: u32 = 0x4002_040c;
-const GPIOC_PUPDR: u32 = 0x4002_080c;
-const GPIOB_IDR: u32 = 0x4002_0410;
-/// The gate driver's nFAULT is PC12, and its enable PC10.
-const GPIOC_IDR: u32 = 0x4002_0810;
-const GPIOC_BSRR: u32 = 0x4002_0818;
-const FAULT: u32 = 1 << 12;
-const ENABLE: u32 = 1 << 10;
-const DISABLE: u32 = ENABLE << 16;
-const EXTI_IMR: u32 = 0x4001_3c00;
-
-/// Device 0x413: revision A, whose prefetch must stay off (ES0182), and revision 1.
-const REVISION_A: u32 = 0x1000_6413;
-const REVISION_1: u32 = 0x1007_6413;
-
-/// The control interrupt comes within half of it.
-const END: Cycles = 40_000_000;
-
-/// The end-of-conversion interrupt of the injected sequence, and how often it comes: 24 kHz.
-const CONVERTED: u16 = 18;
-const PERIOD: Cycles = 7_000;
-
-/// Exceptions in the vector table before the interrupts, and the second DMA's streams after them.
-const EXCEPTIONS: usize = 16;
+/// The second DMA's streams among the interrupts.
 const SECOND_DMA: [usize; 8] = [56, 57, 58, 59, 60, 68, 69, 70];
 
 /// Returns the linked image, from the start of the flash.
@@ -96,157 +31,6 @@ fn image() -> Vec<u8> {
     fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The gate driver's alarm and its enable, as set up by the program.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Driver {
-    heard: bool,
-    enabled: bool,
-}
-
-/// The crystal's defects.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Crystal {
-    Sound,
-    /// It does not start.
-    Dead,
-    /// It stops in this control period.
-    Stops(usize),
-}
-
-/// The chip's registers.
-#[derive(Clone)]
-struct Registers {
-    revision: u32,
-    crystal: Crystal,
-    words: HashMap<u32, u32>,
-    lines: Lines,
-    now: Cycles,
-    /// When the converters are next done.
-    converted: Cycles,
-    /// The gate driver at the start of each control period.
-    periods: Vec<Driver>,
-    /// The control periods in which the gate driver's alarm is low.
-    alarm: Range<usize>,
-    driver_enabled: bool,
-    /// How often port B, with two Hall sensors, was read.
-    hall_reads: usize,
-    outputs_were_on: bool,
-    /// What the serial line has sent.
-    sent: Vec<u8>,
-    /// When the run ends.
-    ends: fn(&Self) -> bool,
-}
-
-impl Registers {
-    fn word(&self, address: u32) -> u32 {
-        let word = self.words.get(&address).copied().unwrap_or(0);
-        match address {
-            RCC_CR if self.crystal == Crystal::Dead => {
-                word | (word & SWITCHED_ON & !CRYSTAL_ON) << 1
-            }
-            RCC_CR | RCC_CSR => word | (word & SWITCHED_ON) << 1,
-            RCC_CFGR => word | (word & SELECTED) << 2,
-            PWR_CSR => word | SCALED,
-            DBGMCU_IDCODE => self.revision,
-            TIM4_CNT => (self.now / CYCLES_A_US) as u32 & 0xffff,
-            // It is counting down when the control begins.
-            TIM1_CR1 => word | DOWN,
-            TIM1_SR => word | UPDATED,
-            USART6_SR => SENT,
-            GPIOC_IDR => {
-                if self.alarms() {
-                    0
-                } else {
-                    FAULT
-                }
-            }
-            _ => word,
-        }
-    }
-
-    /// Returns whether the gate driver's alarm is low in this period.
-    fn alarms(&self) -> bool {
-        let period = self.periods.len().checked_sub(1);
-        period.is_some_and(|period| self.alarm.contains(&period))
-    }
-
-    /// Returns whether the program has set up the PWM timer, which it does after the clocks.
-    fn timer_taken(&self) -> bool {
-        self.word(RCC_APB2ENR) & TIM1 != 0
-    }
-}
-
-impl Surroundings for Registers {
-    fn now(&self) -> Cycles {
-        self.now
-    }
-
-    fn read(&mut self, address: u32, width: Width) -> Result<u32, BusError> {
-        self.hall_reads += usize::from(address == GPIOB_IDR);
-        let word = self.word(address & !3) >> (8 * (address & 3));
-        Ok(match width {
-            Width::Byte => word & 0xff,
-            Width::Half => word & 0xffff,
-            Width::Word => word,
-        })
-    }
-
-    fn write(&mut self, address: u32, width: Width, value: u32) -> Result<(), BusError> {
-        // Set-up writes are whole words.
-        if width == Width::Word {
-            self.words.insert(address, value);
-        }
-        match address {
-            // The control clears the request.
-            ADC1_SR => self.lines.set(CONVERTED, false),
-            GPIOC_BSRR if value & ENABLE != 0 => self.driver_enabled = true,
-            GPIOC_BSRR if value & DISABLE != 0 => self.driver_enabled = false,
-            TIM1_BDTR => self.outputs_were_on |= value & OUTPUTS_ON != 0,
-            USART6_DR => self.sent.push(value as u8),
-            _ => {}
-        }
-        Ok(())
-    }
-
-    fn pass(&mut self, cycles: Cycles) {
-        self.now += cycles;
-        if self.now >= self.converted {
-            self.converted += PERIOD;
-            self.lines.set(CONVERTED, true);
-        }
-    }
-
-    fn next(&self) -> Cycles {
-        self.converted
-    }
-
-    fn lines(&self) -> &Lines {
-        &self.lines
-    }
-
-    fn asks_to_stop(&self) -> bool {
-        (self.ends)(self) || self.now > END
-    }
-
-    fn flash_busy_until(&self) -> Cycles {
-        0
-    }
-
-    fn exception(&mut self, passage: &HandlerEvent) {
-        if passage.entered && usize::from(passage.exception) == EXCEPTIONS + usize::from(CONVERTED)
-        {
-            self.periods.push(Driver {
-                heard: self.word(EXTI_IMR) & FAULT != 0,
-                enabled: self.driver_enabled,
-            });
-            let stops = self.crystal == Crystal::Stops(self.periods.len());
-            if stops && self.word(RCC_CR) & CRYSTAL_WATCHED != 0 {
-                self.lines.non_maskable = true;
-            }
-        }
-    }
-}
-
 /// Runs these bytes of an image on a chip of this revision.
 fn run(
     bytes: &[u8],
@@ -254,47 +38,13 @@ fn run(
     alarm: Range<usize>,
     ends: fn(&Registers) -> bool,
 ) -> Registers {
-    let (registers, stop) = run_with(Crystal::Sound, bytes, revision, alarm, ends);
+    let chip = Registers {
+        alarm,
+        ..Registers::of(revision, ends)
+    };
+    let (registers, stop) = chip.run(bytes);
     assert_eq!(stop, Stop::Asked);
     registers
-}
-
-/// Likewise with this crystal; also returns why it stopped.
-fn run_with(
-    crystal: Crystal,
-    bytes: &[u8],
-    revision: u32,
-    alarm: Range<usize>,
-    ends: fn(&Registers) -> bool,
-) -> (Registers, Stop) {
-    let flash = Memory::new(FLASH, FLASH_BYTES, 0xff);
-    flash.load(FLASH, bytes);
-    let mapped = |memory, writable| Mapped { memory, writable };
-    let memories = [
-        mapped(flash, false),
-        mapped(Memory::new(CCM, CCM_BYTES, 0), true),
-        mapped(Memory::new(SRAM, SRAM_BYTES, 0), true),
-    ];
-    let registers = Registers {
-        revision,
-        crystal,
-        // The internal oscillator.
-        words: HashMap::from([(RCC_CR, 1)]),
-        lines: Lines::default(),
-        now: 0,
-        converted: PERIOD,
-        periods: Vec::new(),
-        alarm,
-        driver_enabled: false,
-        hall_reads: 0,
-        outputs_were_on: false,
-        sent: Vec::new(),
-        ends,
-    };
-    let mut processor = Processor::new(registers, &memories);
-    processor.reset(FLASH);
-    let stop = processor.run();
-    (processor.surroundings().clone(), stop)
 }
 
 /// Starts the image on a chip of this revision, and returns how its flash is read from then on.
@@ -353,7 +103,11 @@ fn pll(word: u32) -> (bool, u32) {
 fn a_crystal_that_does_not_start_is_replaced() {
     for (crystal, has_crystal) in [(Crystal::Sound, true), (Crystal::Dead, false)] {
         let periods = |registers: &Registers| registers.periods.len() > 10;
-        let (registers, stop) = run_with(crystal, &image(), REVISION_1, 0..0, periods);
+        let chip = Registers {
+            crystal,
+            ..Registers::of(REVISION_1, periods)
+        };
+        let (registers, stop) = chip.run(&image());
         assert!(registers.periods.len() > 10, "{crystal:?}: {stop:?}");
         assert_eq!(pll(registers.word(RCC_PLLCFGR)), (has_crystal, 168));
         let control = registers.word(RCC_CR);
@@ -370,9 +124,12 @@ fn a_crystal_that_does_not_start_is_replaced() {
 /// Without it the chip runs ten times as slowly, and so does the PWM: the bridge must not go on.
 #[test]
 fn a_crystal_that_stops_turns_the_bridge_off_and_restarts() {
-    let crystal = Crystal::Stops(100);
     let periods = |registers: &Registers| registers.periods.len() > 110;
-    let (registers, stop) = run_with(crystal, &image(), REVISION_1, 0..0, periods);
+    let chip = Registers {
+        crystal: Crystal::Stops(100),
+        ..Registers::of(REVISION_1, periods)
+    };
+    let (registers, stop) = chip.run(&image());
     assert_eq!((registers.periods.len(), stop), (100, Stop::Reset));
     assert_eq!(registers.word(TIM1_BDTR) & OUTPUTS_ON, 0);
 }
