@@ -7,7 +7,7 @@ use embassy_stm32::pac::iwdg::vals::Key;
 use embassy_stm32::pac::{FLASH, IWDG};
 
 pub(crate) use super::pages::{PAGE_BYTES, WORD_BYTES};
-use super::pages::{erasing, programming};
+use super::pages::{erasing, programming, supply_is_low};
 
 /// Start of the flash.
 const ORIGIN: usize = 0x0800_0000;
@@ -57,6 +57,9 @@ pub(crate) unsafe fn erase(address: usize) -> Result<(), Failed> {
 
 /// Runs `act` with the flash unlocked and no interrupt but the control's, then checks for errors.
 fn with_unlocked(act: impl FnOnce()) -> Result<(), Failed> {
+    if supply_is_low() {
+        return Err(Failed);
+    }
     critical_section::with(|_| {
         FLASH.keyr().write_value(0x4567_0123);
         FLASH.keyr().write_value(0xcdef_89ab);

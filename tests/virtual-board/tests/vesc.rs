@@ -12,6 +12,8 @@
 mod chip;
 #[path = "image/common/made.rs"]
 mod made;
+#[path = "vesc/store.rs"]
+mod store;
 
 use std::collections::HashMap;
 use std::fs;

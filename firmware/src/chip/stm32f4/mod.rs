@@ -45,6 +45,7 @@ pub(crate) fn acknowledge(converters: &[Adc; 2]) {
 pub(crate) fn start() -> Peripherals {
     let peripherals = embassy_stm32::init(clock::config());
     clock::watch();
+    pages::watch_supply();
     // The HAL wrote the whole register with nothing but the wait states (embassy-stm32 0.6). A fetch of four
     // instructions or more then takes six clocks, most of which caches and prefetch save (RM0090, 3.5).
     let id = DBGMCU.idcode().read();

@@ -35,3 +35,8 @@ pub(crate) fn take_torn_word() -> bool {
     FLASH.eccr().write_value(status);
     status.eccd() && !status.sysf_ecc()
 }
+
+/// Returns false: this flash can be programmed wherever the chip runs (DS12589, operating conditions).
+pub(crate) const fn supply_is_low() -> bool {
+    false
+}
