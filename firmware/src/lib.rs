@@ -80,6 +80,7 @@
 //! | overrun, three in a row or more than one in 100 periods for long | the PWM interrupt, at the end of that period; in flight the motor is caught again | control too slow |
 //! | damage to a stamped image | start-up, which never turns it on | at 115200 baud, and by the light |
 //! | panic, hard fault, stack overflow, interrupt without a handler | [`last_words`], first of all | after the reset |
+//! | the crystal stops, F405: the chip goes on at 16 MHz | the non-maskable interrupt's handler, and a reset | after the reset |
 //! | processor lockup, G431 | the timer's break | after the watchdog's reset |
 //! | processor halted by a debugger | the timer, which stops with it ([below](#a-debuggers-halt)) | nothing |
 //! | tasks or interrupt stopped | the watchdog's reset: the gates' pull-downs | after the reset |
@@ -97,9 +98,9 @@
 //! None of this has run on a board. Pins and alternate functions agree with the metadata of `stm32-metapac`: on
 //! the F405 the HAL's types would accept no others, on the G431 they are numbers. That the comparators' inputs,
 //! DAC3's channels and the break's bits are as `chip` has them is from the reference manual alone. Of the
-//! boards, these could not be checked: the order and the sign of the VESC's two shunts, the amplifiers'
-//! settling times, how the straps of a DRV8302 are set, the thermistor of the B-G431B-ESC1, and where the
-//! second resistor of its shunts' ground goes. The end of a reply assumes that a timer whose UDE is cleared
+//! boards, these could not be checked: the order and the sign of the VESC's two shunts, the order of its Hall
+//! sensors, the amplifiers' settling times, how the straps of a DRV8302 are set, the thermistor of the
+//! B-G431B-ESC1, and where the second resistor of its shunts' ground goes. The end of a reply assumes that a timer whose UDE is cleared
 //! requests no more words (RM0440 does not say so); the VESC's reply, by TIM3's forced output, runs on no
 //! virtual board.
 #![cfg_attr(not(test), no_std)]

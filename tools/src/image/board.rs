@@ -39,7 +39,7 @@ impl Board {
             let boards = all[1..].iter().map(|board| board.name());
             let boards: Vec<_> = boards.collect();
             format!(
-                "made for a VESC with any shunts; make it for one of {}",
+                "made for a VESC that does not say which shunts it has; make it for one of {}",
                 boards.join(", ")
             )
         } else {

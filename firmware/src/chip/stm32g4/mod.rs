@@ -25,9 +25,9 @@ pub(crate) const INTERRUPTS: usize = 102;
 /// The interrupt at the end of the injected conversions.
 pub(crate) const CONVERTED: interrupt::Interrupt = interrupt::ADC1_2;
 
-/// Rejects spikes below 82 ns on the throttle wire: seven intervals between eight samples, at half of the timer's clock.
-/// DShot1200's shortest level is 313 ns, and both edges come later by as much. ESCape32 takes eight samples at the chip's
-/// clock, of 48 to 170 MHz: up to 146 ns.
+/// Rejects spikes below 82 ns on the throttle wire: seven intervals between eight samples, at half of the timer's
+/// clock. DShot1200's shortest level is 313 ns, and both edges come later by as much. ESCape32 takes eight samples at
+/// the chip's clock, of 48 to 170 MHz: up to 146 ns.
 pub(crate) const EDGE_FILTER: FilterValue = FilterValue::FDTS_DIV2_N8;
 
 /// Word offset of the injected readings in a converter's registers: JDR1 at 0x80.

@@ -45,8 +45,8 @@ pub(crate) const CODE_CACHE: u32 = 1 << 9;
 pub(crate) const CONSTANTS_CACHE: u32 = 1 << 10;
 pub(crate) const DBGMCU_IDCODE: u32 = 0xe004_2000;
 
-/// The time driver's timer counts microseconds. Where tasks are to run, it is due each millisecond: its alarm and, as often as
-/// half of its range has passed, the flag of that half.
+/// The time driver's timer counts microseconds. Where tasks are to run, it is due each millisecond: its alarm and,
+/// as often as half of its range has passed, the flag of that half.
 pub(crate) const TIM4_CNT: u32 = 0x4000_0824;
 pub(crate) const TIM4_SR: u32 = 0x4000_0810;
 pub(crate) const DUE: u32 = 1 << 2;
