@@ -6,10 +6,20 @@ use mavlink::dialects::ardupilotmega::{MavCmd, MavResult};
 use serde_json::{Value, json};
 
 use crate::error::Error;
+use crate::progress::Progress;
 use crate::session::Session;
-use crate::{ftp, json, step_by_step};
+use crate::step_by_step::{self, Task};
+use crate::{ftp, json};
 
-const COMMAND: MavCmd = MavCmd::MAV_CMD_RUN_PREARM_CHECKS;
+/// The self-test, which takes most of a second.
+const TASK: Task = Task {
+    what: "self-test",
+    command: MavCmd::MAV_CMD_RUN_PREARM_CHECKS,
+    param1: 0.0,
+    end: None,
+    failures: &["Fault: "],
+    steps: None,
+};
 
 /// Where the ESC serves its results.
 const REPORT: &str = "@SYS/check.txt";
@@ -31,14 +41,16 @@ struct Item {
 /// # Errors
 /// [`Error::Refused`] if the ESC cannot test itself now, [`Error::Partly`] if an item has failed.
 pub(crate) fn run(session: &mut Session, as_json: bool, out: &mut dyn Write) -> Result<(), Error> {
-    let what = "self-test";
-    let (result, texts) = step_by_step::run(session, what, (COMMAND, 0.0), &["Fault: "])?;
+    let (result, texts) = {
+        let mut progress = Progress::new(TASK.what);
+        step_by_step::run(session, &TASK, &mut progress)?
+    };
     let passed = match result {
         MavResult::MAV_RESULT_ACCEPTED => true,
         MavResult::MAV_RESULT_FAILED => false,
         other => {
             return Err(Error::Refused {
-                what: what.into(),
+                what: TASK.what.into(),
                 reason: step_by_step::why(other).into(),
             });
         }

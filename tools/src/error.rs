@@ -62,6 +62,14 @@ pub(crate) enum Error {
     #[error("{what}: no answer after {attempts} attempts; check the link and try again")]
     NoAnswer { what: String, attempts: u32 },
 
+    /// A signal came while the ESC did something for this program.
+    #[error("{what}: interrupted; {ended}")]
+    Interrupted {
+        what: String,
+        ended: &'static str,
+        signal: u8,
+    },
+
     /// Nothing came for a while.
     #[error("{what}: nothing for {seconds} s; check the link and TEL_RATE_HZ")]
     Silent { what: String, seconds: u64 },
@@ -85,7 +93,7 @@ impl Error {
     }
 
     /// Returns 2 for bad input or no connection, 1 if the ESC or another program refused or did not answer,
-    /// 0 if only the reader of the output went away, as in `siskin monitor | head -1`.
+    /// 128 and the number of the signal that ended it, as a shell does, 0 if only the reader of the output went away, as in `siskin monitor | head -1`.
     pub(crate) fn exit_code(&self) -> ExitCode {
         match self {
             Self::Usage(_)
@@ -100,6 +108,7 @@ impl Error {
             | Self::NoAnswer { .. }
             | Self::Silent { .. }
             | Self::Partly(_) => ExitCode::from(1),
+            Self::Interrupted { signal, .. } => ExitCode::from(128 + signal),
             Self::Output(e) if e.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
             Self::Output(_) => ExitCode::from(2),
         }

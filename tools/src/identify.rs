@@ -1,20 +1,36 @@
 //! `siskin identify`: has the ESC identify its motor, and prints the results.
 
 use std::io::Write;
-use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use mavlink::dialects::ardupilotmega::{MavCmd, MavResult};
 use serde_json::{Value, json};
 
 use crate::error::Error;
+use crate::progress::Progress;
 use crate::session::Session;
-use crate::{ftp, json, step_by_step};
+use crate::step_by_step::{self, Task};
+use crate::{ftp, json};
 
-/// The dialect has no command of its own for it; parameter 1 says what to do.
-const COMMAND: MavCmd = MavCmd::MAV_CMD_USER_1;
-const BEGIN: f32 = 1.0;
-const KEEP: f32 = 2.0;
+/// The identification. The dialect has no command of its own for it; parameter 1 says what to do.
+const TASK: Task = Task {
+    what: "identification",
+    command: MavCmd::MAV_CMD_USER_1,
+    param1: 1.0,
+    end: Some(0.0),
+    failures: &["Not identified: ", "Fault: "],
+    steps: Some("Identification: "),
+};
+
+/// Has what was found kept.
+const KEEP: Task = Task {
+    what: "what was found",
+    param1: 2.0,
+    end: None,
+    failures: &["Not kept: "],
+    steps: None,
+    ..TASK
+};
 
 /// Where the ESC serves its results.
 const REPORT: &str = "@SYS/identify.txt";
@@ -41,10 +57,12 @@ pub(crate) fn run(
     (keep, as_json): (bool, bool),
     out: &mut dyn Write,
 ) -> Result<(), Error> {
-    let what = "identification";
-    let beginnings = ["Not identified: ", "Fault: "];
-    let (result, texts) = step_by_step::run(session, what, (COMMAND, BEGIN), &beginnings)?;
-    accepted(what, result, &texts)?;
+    {
+        // Dropped, and so cleared from the terminal, before anything else is printed.
+        let mut progress = Progress::new(TASK.what);
+        let (result, texts) = step_by_step::run(session, &TASK, &mut progress)?;
+        accepted(TASK.what, result, &texts)?;
+    }
     let report = String::from_utf8_lossy(&ftp::read(session, REPORT)?).into_owned();
     let figures = report.lines().map(Figure::parse);
     let figures = figures.collect::<Option<Vec<_>>>().ok_or(Error::Refused {
@@ -67,14 +85,16 @@ pub(crate) fn run(
 
 /// Has the results kept and stored, once the shaft stands.
 fn keep(session: &mut Session) -> Result<(), Error> {
-    let what = "what was found";
+    let mut progress = Progress::new(KEEP.what);
+    progress.step("waiting for the shaft to stand");
     for attempt in 1.. {
-        let (result, texts) = step_by_step::run(session, what, (COMMAND, KEEP), &["Not kept: "])?;
+        let (result, texts) = step_by_step::run(session, &KEEP, &mut progress)?;
         if result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED && attempt < KEEP_ATTEMPTS {
-            sleep(KEEP_PAUSE);
+            let pause = Instant::now() + KEEP_PAUSE;
+            while session.next_of_target(pause)?.is_some() {}
             continue;
         }
-        return accepted(what, result, &texts);
+        return accepted(KEEP.what, result, &texts);
     }
     Ok(())
 }

@@ -3,8 +3,8 @@
 use mavlink::dialects::ardupilotmega::{
     COMMAND_ACK_DATA, ESC_INFO_DATA, ESC_STATUS_DATA, ESC_TELEMETRY_1_TO_4_DATA,
     ESC_TELEMETRY_5_TO_8_DATA, ESC_TELEMETRY_9_TO_12_DATA, ESC_TELEMETRY_13_TO_16_DATA,
-    FILE_TRANSFER_PROTOCOL_DATA, HEARTBEAT_DATA, MavAutopilot, MavSeverity, MavType,
-    NAMED_VALUE_FLOAT_DATA, PARAM_ERROR_DATA, PARAM_VALUE_DATA, STATUSTEXT_DATA,
+    FILE_TRANSFER_PROTOCOL_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavResult, MavSeverity,
+    MavType, NAMED_VALUE_FLOAT_DATA, PARAM_ERROR_DATA, PARAM_VALUE_DATA, STATUSTEXT_DATA,
 };
 use mavlink::types::CharArray;
 use mavlink::{MavlinkVersion, MessageData};
@@ -28,7 +28,7 @@ pub(crate) enum Message {
     Heartbeat(Heartbeat),
     ParamValue(PARAM_VALUE_DATA),
     ParamError(PARAM_ERROR_DATA),
-    CommandAck(COMMAND_ACK_DATA),
+    CommandAck(Ack),
     StatusText(StatusText),
     EscInfo(ESC_INFO_DATA),
     EscStatus(ESC_STATUS_DATA),
@@ -36,6 +36,27 @@ pub(crate) enum Message {
     Named(NAMED_VALUE_FLOAT_DATA),
     /// A MAVLink FTP answer, unparsed.
     File([u8; 251]),
+}
+
+/// What has become of a command so far.
+#[derive(Clone, Debug)]
+pub(crate) struct Ack {
+    pub(crate) command: MavCmd,
+    pub(crate) result: MavResult,
+    /// How far a command in progress is, percent.
+    pub(crate) percent: u8,
+}
+
+impl Ack {
+    fn read(payload: &[u8]) -> Option<Self> {
+        let data = COMMAND_ACK_DATA::deser(MavlinkVersion::V2, payload).ok()?;
+        Some(Self {
+            command: data.command,
+            result: data.result,
+            // An extension field, which the generated type lacks.
+            percent: payload.get(3).copied().unwrap_or(0),
+        })
+    }
 }
 
 /// One of the `ESC_TELEMETRY_*` messages, which share a layout.
@@ -166,7 +187,7 @@ impl Message {
             })),
             PARAM_VALUE_DATA::ID => typed(payload).map(Self::ParamValue),
             PARAM_ERROR_DATA::ID => typed(payload).map(Self::ParamError),
-            COMMAND_ACK_DATA::ID => typed(payload).map(Self::CommandAck),
+            COMMAND_ACK_DATA::ID => Ack::read(payload).map(Self::CommandAck),
             NAMED_VALUE_FLOAT_DATA::ID => typed(payload).map(Self::Named),
             FILE_TRANSFER_PROTOCOL_DATA::ID => {
                 typed(payload).map(|data: FILE_TRANSFER_PROTOCOL_DATA| Self::File(data.payload))

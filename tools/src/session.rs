@@ -10,6 +10,7 @@ use mavlink::{MAVLinkV2MessageRaw, MavHeader, MessageData};
 use siskin_control::mavlink::{Address, Receiver};
 
 use crate::error::Error;
+use crate::interrupt::Interrupt;
 use crate::link::Link;
 use crate::message::{Incoming, Message, Texts, name_of};
 
@@ -34,6 +35,9 @@ pub(crate) const ANSWER_TIMEOUT: Duration = Duration::from_millis(400);
 /// How often the receiver is called when nothing arrives, so that it drops a frame whose rest was lost.
 const RECEIVER_PERIOD: Duration = Duration::from_millis(20);
 
+/// Texts that are remembered: an identification has at most seven.
+const TOLD: usize = 16;
+
 /// A link on which one ESC has been chosen.
 pub(crate) struct Session {
     link: Link,
@@ -42,7 +46,11 @@ pub(crate) struct Session {
     sequence: u8,
     arrived: VecDeque<Incoming>,
     texts: Texts,
+    /// The latest whole texts, which may have come while something else was waited for.
+    told: VecDeque<(Address, String)>,
     target: Address,
+    /// What a signal has to end first.
+    interrupt: Option<Interrupt>,
 }
 
 impl Session {
@@ -62,10 +70,12 @@ impl Session {
             sequence: 0,
             arrived: VecDeque::new(),
             texts: Texts::default(),
+            told: VecDeque::new(),
             target: Address {
                 system: 0,
                 component: 0,
             },
+            interrupt: None,
         };
         session.greet()?;
         let named = system.is_some() || component.is_some();
@@ -98,6 +108,17 @@ impl Session {
     /// Returns the ESC being talked to.
     pub(crate) fn target(&self) -> Address {
         self.target
+    }
+
+    /// From now on a signal is an [`Error::Interrupted`] of what waits for the ESC, in place of the program's end.
+    ///
+    /// # Errors
+    /// The system's.
+    pub(crate) fn watch_interrupt(&mut self) -> Result<(), Error> {
+        if self.interrupt.is_none() {
+            self.interrupt = Some(Interrupt::watch()?);
+        }
+        Ok(())
     }
 
     /// Tells the other side that a ground station is here: it replies to the address that it hears.
@@ -185,20 +206,31 @@ impl Session {
 
     /// Waits for bytes, but no longer than the receiver may go without a call.
     fn fill(&mut self, wait: Duration) -> Result<(), Error> {
+        if let Some(signal) = self.interrupt.as_ref().and_then(Interrupt::take) {
+            return Err(Error::Interrupted {
+                what: name_of(self.target),
+                ended: "nothing is left to be ended",
+                signal,
+            });
+        }
         let mut buffer = [0; 2048];
         let length = self.link.receive(&mut buffer, wait.min(RECEIVER_PERIOD))?;
         let now_us = self.now_us();
-        let (arrived, texts) = (&mut self.arrived, &mut self.texts);
+        let (arrived, texts, told) = (&mut self.arrived, &mut self.texts, &mut self.told);
         self.receiver.push(now_us, &buffer[..length], |frame| {
             let from = frame.from;
             let message = match Message::read(frame.id, frame.payload) {
                 Some(Message::StatusText(piece)) => {
-                    texts.join(from, piece).map(Message::StatusText)
+                    let whole = texts.join(from, piece);
+                    told.extend(whole.iter().map(|whole| (from, whole.text.clone())));
+                    whole.map(Message::StatusText)
                 }
                 other => other,
             };
             arrived.extend(message.map(|message| Incoming { from, message }));
         });
+        let excess = self.told.len().saturating_sub(TOLD);
+        self.told.drain(..excess);
         Ok(())
     }
 
@@ -213,6 +245,22 @@ impl Session {
             }
         }
         Ok(None)
+    }
+
+    /// Forgets the texts that have come so far.
+    pub(crate) fn forget_texts(&mut self) {
+        self.told.clear();
+    }
+
+    /// Returns the ESC's latest texts with one of these beginnings, whatever was waited for when they came.
+    pub(crate) fn texts(&self, beginnings: &[&str]) -> Vec<String> {
+        let of_target = self.told.iter().filter(|(from, _)| *from == self.target);
+        let begins = |text: &&String| beginnings.iter().any(|of| text.starts_with(of));
+        of_target
+            .map(|(_, text)| text)
+            .filter(begins)
+            .cloned()
+            .collect()
     }
 
     /// Repeats a question until `accept` finds the answer among the ESC's messages.
