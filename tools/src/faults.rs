@@ -9,7 +9,7 @@ use siskin_control::record::{FaultSeen, PeriodSeen, Recorded};
 use crate::cli::FaultsArgs;
 use crate::error::Error;
 use crate::ftp;
-use crate::json::number;
+use crate::json::{fixed, number};
 use crate::session::Session;
 
 /// Where the ESC serves its record.
@@ -103,13 +103,13 @@ fn line(seen: &FaultSeen) -> String {
         starts => format!(" {starts} starts ago"),
     };
     format!(
-        "{:>3} {:<21} in {:<8} at {:>9.3} s {:>6.0} rpm {:>5.1} V{when}",
+        "{:>3} {:<21} in {:<8} at {:>9.3} s {:>6} rpm {:>5} V{when}",
         seen.number,
         seen.fault.text(),
         phase(seen),
         seen.time_s,
-        seen.rpm,
-        seen.bus_v,
+        fixed(seen.rpm, 0),
+        fixed(seen.bus_v, 1),
     )
 }
 

@@ -11,7 +11,7 @@ use siskin_control::telemetry::SIGNALS;
 
 use crate::cli::MonitorArgs;
 use crate::error::Error;
-use crate::json::number;
+use crate::json::{fixed, number};
 use crate::message::{Message, StatusText, name_of, text};
 use crate::sample::Source;
 use crate::session::Session;
@@ -85,7 +85,7 @@ pub(crate) fn run(
                 } else {
                     view.latest.insert(
                         Line::Signal(component, number),
-                        format!("      {name:<10} {:>12.4}", signal.value),
+                        format!("      {name:<10} {:>12}", fixed(signal.value, 4)),
                     );
                 }
             }

@@ -5,7 +5,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 use serde_json::{Value, json};
 
-use crate::json::number;
+use crate::json::{fixed, number};
 
 /// ESCs in one `ESC_STATUS`.
 const SLOTS: usize = 4;
@@ -97,11 +97,15 @@ impl Row {
     /// Formats it in at most 79 characters, if no more than one failure is shown.
     pub(crate) fn line(&self) -> String {
         let mut line = format!(
-            "ESC {} {:>8.2} s {:>6} rpm {:>6.2} V {:>7.2} A",
-            self.esc, self.time_s, self.rpm, self.bus_v, self.bus_a
+            "ESC {} {:>8.2} s {:>6} rpm {:>6} V {:>7} A",
+            self.esc,
+            self.time_s,
+            self.rpm,
+            fixed(self.bus_v, 2),
+            fixed(self.bus_a, 2)
         );
         if let Some(temperature_c) = self.temperature_c {
-            line += &format!(" {temperature_c:>5.1} \u{b0}C");
+            line += &format!(" {:>5} \u{b0}C", fixed(temperature_c, 1));
         }
         if let Some(consumed_mah) = self.consumed_mah {
             line += &format!(" {consumed_mah:>5} mAh");
@@ -188,6 +192,16 @@ mod tests {
             })
         );
         assert_eq!(bare[0].json()["failures"], Value::Null);
+    }
+
+    #[test]
+    fn what_is_left_of_no_current_is_shown_as_none() {
+        for bus_a in [-0.0, -1.4e-43, -0.004] {
+            let mut status = status(0);
+            status.current[0] = bus_a;
+            let row = &Source::default().rows(&status)[0];
+            assert!(row.line().ends_with("    0.00 A"), "{}", row.line());
+        }
     }
 
     #[test]
