@@ -55,12 +55,18 @@ pub(crate) fn run(session: &mut Session, as_json: bool, out: &mut dyn Write) -> 
             });
         }
     };
-    let report = String::from_utf8_lossy(&ftp::read(session, REPORT)?).into_owned();
+    let report = ftp::read_text(session, REPORT)?;
     let items = report.lines().map(Item::parse);
     let items = items.collect::<Option<Vec<_>>>().ok_or(Error::Refused {
         what: REPORT.into(),
         reason: "cannot be parsed; use the siskin program of the image's version".into(),
     })?;
+    if passed && items.is_empty() {
+        return Err(Error::Refused {
+            what: TASK.what.into(),
+            reason: "the ESC says that it passed, but lists nothing; try again".into(),
+        });
+    }
     if as_json {
         let items: Vec<_> = items.iter().map(Item::json).collect();
         writeln!(out, "{}", json!({ "items": items }))?;
@@ -126,7 +132,7 @@ impl Item {
     fn line(&self) -> String {
         let value = self
             .value
-            .map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
+            .map_or_else(|| "-".to_owned(), |value| json::fixed(value, 3));
         let verdict = if self.ok { "ok" } else { "FAILED" };
         format!(
             "{:<13} {value:>10} {:<4} {:>9.3} to {:>9.3}  {verdict}",

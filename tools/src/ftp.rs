@@ -20,10 +20,30 @@ const HEADER: usize = 12;
 /// Bytes per request: as many as a message holds.
 const PIECE: usize = 239;
 
+/// The most that a file may have: several times the longest that is read, the fault record, and half a minute at 57600
+/// baud.
+const FILE_MAX: usize = 64 * 1024;
+/// The most requests for it: an ESC may send less than a whole piece, but not forever.
+const PIECES_MAX: usize = 1024;
+
+/// Reads a text; what a terminal would take for more than text becomes `?`.
+///
+/// # Errors
+/// Those of [`read`].
+pub(crate) fn read_text(session: &mut Session, path: &str) -> Result<String, Error> {
+    let file = read(session, path)?;
+    let plain = |byte: u8| match byte {
+        b'\n' | b' ' => char::from(byte),
+        _ if byte.is_ascii_graphic() => char::from(byte),
+        _ => '?',
+    };
+    Ok(file.into_iter().map(plain).collect())
+}
+
 /// Reads a whole file.
 ///
 /// # Errors
-/// [`Error::Refused`] if the ESC has no such file, [`Error::NoAnswer`] if it is silent.
+/// [`Error::Refused`] if the ESC has no such file or does not come to its end, [`Error::NoAnswer`] if it is silent.
 pub(crate) fn read(session: &mut Session, path: &str) -> Result<Vec<u8>, Error> {
     let mut sequence = 0;
     let mut request = |opcode, offset: usize, data: &[u8], size| {
@@ -44,7 +64,10 @@ pub(crate) fn read(session: &mut Session, path: &str) -> Result<Vec<u8>, Error> 
     request(RESET_SESSIONS, 0, &[], 0)?.map_err(refused)?;
     request(OPEN_FILE_RO, 0, path.as_bytes(), path.len())?.map_err(refused)?;
     let mut file = Vec::new();
-    loop {
+    for _ in 0..PIECES_MAX {
+        if file.len() > FILE_MAX {
+            break;
+        }
         match request(READ_FILE, file.len(), &[], PIECE)? {
             Ok(piece) if !piece.is_empty() => file.extend(piece),
             Ok(_) | Err(END_OF_FILE) => return Ok(file),
@@ -56,6 +79,13 @@ pub(crate) fn read(session: &mut Session, path: &str) -> Result<Vec<u8>, Error> 
             }
         }
     }
+    Err(Error::Refused {
+        what: path.into(),
+        reason: format!(
+            "no end after {} bytes; is this a Siskin ESC? Name another with --component",
+            file.len()
+        ),
+    })
 }
 
 /// Sends one request; returns the data of the answer, or the number of the refusal.

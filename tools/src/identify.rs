@@ -7,6 +7,7 @@ use mavlink::dialects::ardupilotmega::{MavCmd, MavResult};
 use serde_json::{Value, json};
 
 use crate::error::Error;
+use crate::message::Message;
 use crate::progress::Progress;
 use crate::session::Session;
 use crate::step_by_step::{self, Task};
@@ -35,6 +36,12 @@ const KEEP: Task = Task {
 /// Where the ESC serves its results.
 const REPORT: &str = "@SYS/identify.txt";
 
+/// The text of its success.
+const DONE: &str = "Identification: done";
+
+/// The longest from one step's text to the next, or to the last.
+const NEXT_STEP: Duration = Duration::from_secs(10);
+
 /// How often, and how far apart, it is asked to keep the results, which it does once the shaft stands.
 const KEEP_ATTEMPTS: u32 = 40;
 const KEEP_PAUSE: Duration = Duration::from_millis(500);
@@ -57,30 +64,85 @@ pub(crate) fn run(
     (keep, as_json): (bool, bool),
     out: &mut dyn Write,
 ) -> Result<(), Error> {
-    {
-        // Dropped, and so cleared from the terminal, before anything else is printed.
-        let mut progress = Progress::new(TASK.what);
-        let (result, texts) = step_by_step::run(session, &TASK, &mut progress)?;
-        accepted(TASK.what, result, &texts)?;
-    }
-    let report = String::from_utf8_lossy(&ftp::read(session, REPORT)?).into_owned();
-    let figures = report.lines().map(Figure::parse);
-    let figures = figures.collect::<Option<Vec<_>>>().ok_or(Error::Refused {
-        what: REPORT.into(),
-        reason: "cannot be parsed; use the siskin program of the image's version".into(),
-    })?;
-    if as_json {
-        let figures: Vec<_> = figures.iter().map(Figure::json).collect();
-        writeln!(out, "{}", json!({ "figures": figures }))?;
-    } else {
+    let figures = measured(session)?;
+    if !as_json {
         for figure in &figures {
             writeln!(out, "{}", figure.line())?;
         }
+        out.flush()?;
+    }
+    if as_json {
+        let figures: Vec<_> = figures.iter().map(Figure::json).collect();
+        writeln!(out, "{}", json!({ "figures": figures }))?;
     }
     if keep {
         self::keep(session)?;
     }
     Ok(())
+}
+
+/// Has the motor identified.
+fn measured(session: &mut Session) -> Result<Vec<Figure>, Error> {
+    // Dropped, and so cleared from the terminal, before anything else is printed.
+    let mut progress = Progress::new(TASK.what);
+    let (result, texts) = step_by_step::run(session, &TASK, &mut progress)?;
+    accepted(TASK.what, result, &texts)?;
+    let result = reported(session, &mut progress);
+    step_by_step::or_end(session, &TASK, result)
+}
+
+/// Returns the results. If there are none, the end of something else, as of the test at power-up, was acknowledged as
+/// that of the identification, which goes on: then its texts say how it ends.
+fn reported(session: &mut Session, progress: &mut Progress) -> Result<Vec<Figure>, Error> {
+    let latest = Instant::now() + step_by_step::LONGEST;
+    let mut deadline = Instant::now() + NEXT_STEP;
+    let refused = |reason: String| Error::Refused {
+        what: TASK.what.into(),
+        reason,
+    };
+    loop {
+        // What ended it may have been told before its end was acknowledged, or while the file was read.
+        let was_done = !session.texts(&[DONE]).is_empty();
+        let figures = report(session)?;
+        if !figures.is_empty() {
+            return Ok(figures);
+        }
+        let reasons = session.texts(TASK.failures);
+        if !reasons.is_empty() {
+            return Err(refused(reasons.join("; ")));
+        }
+        let told = if was_done {
+            None
+        } else {
+            next_text(session, deadline.min(latest))?
+        };
+        let Some(text) = told else {
+            step_by_step::end(session, &TASK)?;
+            return Err(refused("it ended without a result; try again".into()));
+        };
+        if let Some(step) = TASK.steps.and_then(|of| text.strip_prefix(of)) {
+            progress.step(step);
+            deadline = Instant::now() + NEXT_STEP;
+        }
+    }
+}
+
+fn next_text(session: &mut Session, deadline: Instant) -> Result<Option<String>, Error> {
+    while let Some(message) = session.next_of_target(deadline)? {
+        if let Message::StatusText(status) = message {
+            return Ok(Some(status.text));
+        }
+    }
+    Ok(None)
+}
+
+fn report(session: &mut Session) -> Result<Vec<Figure>, Error> {
+    let report = ftp::read_text(session, REPORT)?;
+    let figures = report.lines().map(Figure::parse);
+    figures.collect::<Option<Vec<_>>>().ok_or(Error::Refused {
+        what: REPORT.into(),
+        reason: "cannot be parsed; use the siskin program of the image's version".into(),
+    })
 }
 
 /// Has the results kept and stored, once the shaft stands.
@@ -142,7 +204,8 @@ impl Figure {
             unit,
             spread_percent,
         } = self;
-        format!("{name:<16} {value:>10.3} {unit:<7} within {spread_percent:.1} %")
+        let value = json::fixed(*value, 3);
+        format!("{name:<16} {value:>10} {unit:<7} within {spread_percent:.1} %")
     }
 }
 

@@ -20,6 +20,12 @@ pub(crate) const NAME_LENGTH: usize = 16;
 /// answer timeout.
 const BATCH: usize = 10;
 
+/// The most parameters that an ESC is believed to have: ten times those of this version, and more than an autopilot.
+const COUNT_MAX: u16 = 2048;
+
+/// The longest that a list may take; at 57600 baud one takes two seconds.
+const LIST_LONGEST: Duration = Duration::from_secs(120);
+
 /// How long to wait for the reason once a refusal is known.
 const REASON_TIMEOUT: Duration = Duration::from_millis(300);
 
@@ -48,8 +54,9 @@ pub(crate) fn is_name(name: &str) -> bool {
 /// complete.
 ///
 /// # Errors
-/// [`Error::NoAnswer`] if the ESC stays silent.
+/// [`Error::NoAnswer`] if the ESC stays silent, [`Error::Refused`] if its list has no end.
 pub(crate) fn list(session: &mut Session) -> Result<Vec<Param>, Error> {
+    let latest = Instant::now() + LIST_LONGEST;
     let mut values = BTreeMap::new();
     let mut count = None;
     let mut silent_rounds = 0;
@@ -60,6 +67,12 @@ pub(crate) fn list(session: &mut Session) -> Result<Vec<Param>, Error> {
             .collect();
         if count.is_some() && missing.is_empty() {
             return Ok(values.into_values().collect());
+        }
+        if Instant::now() > latest {
+            return Err(endless(
+                session,
+                format!("not complete after {} s", LIST_LONGEST.as_secs()),
+            ));
         }
         if silent_rounds == ATTEMPTS {
             return Err(Error::NoAnswer {
@@ -75,7 +88,6 @@ pub(crate) fn list(session: &mut Session) -> Result<Vec<Param>, Error> {
             })?;
         }
         for &index in &missing {
-            // An index above 32767 cannot be requested; no ESC has so many.
             let Ok(param_index) = i16::try_from(index) else {
                 continue;
             };
@@ -95,6 +107,12 @@ pub(crate) fn list(session: &mut Session) -> Result<Vec<Param>, Error> {
             // An answer to a set may carry 65535 instead of the index.
             if value.param_index >= value.param_count {
                 continue;
+            }
+            if value.param_count > COUNT_MAX {
+                return Err(endless(
+                    session,
+                    format!("claims to have {} parameters", value.param_count),
+                ));
             }
             count = Some(value.param_count);
             let param = Param {
@@ -118,6 +136,13 @@ pub(crate) fn list(session: &mut Session) -> Result<Vec<Param>, Error> {
         } else {
             0
         };
+    }
+}
+
+fn endless(session: &Session, reason: String) -> Error {
+    Error::Refused {
+        what: format!("parameter list of {}", name_of(session.target())),
+        reason: format!("{reason}; is this a Siskin ESC? Name another with --component"),
     }
 }
 

@@ -17,7 +17,7 @@ const REASON_TIMEOUT: Duration = Duration::from_millis(200);
 
 /// The longest that any of them may be under way: an identification takes 5 to 15 s, and several times that on an
 /// emulator that does not keep up.
-const LONGEST: Duration = Duration::from_secs(180);
+pub(crate) const LONGEST: Duration = Duration::from_secs(180);
 
 /// What an ESC is to do.
 pub(crate) struct Task {
@@ -142,8 +142,11 @@ fn follow(session: &mut Session, task: &Task, progress: &mut Progress) -> Result
     })
 }
 
-/// Has the ESC end it.
-fn end(session: &mut Session, task: &Task) -> Result<(), Error> {
+/// Has the ESC end it, if it is still under way.
+///
+/// # Errors
+/// [`Error::NoAnswer`] if the ESC is silent.
+pub(crate) fn end(session: &mut Session, task: &Task) -> Result<(), Error> {
     let Some(param1) = task.end else {
         return Ok(());
     };
