@@ -29,20 +29,24 @@ def test_what_is_found_is_shown_and_set_only_when_it_is_to_be_kept(start, tmp_pa
             esc.set_param(name, 0.0)
     ended = siskin(emulator, "identify", "--json")
     assert ended.returncode == 0, ended.stderr
-    figures = {figure["name"]: figure for figure in json.loads(ended.stdout)["figures"]}
+    figures = {figure["name"]: figure for figure in json.loads(ended.stdout)["items"]}
     assert list(figures)[:4] == FOUND
     # The first paper's bench, within what identification promises.
     for name, truth, share in zip(FOUND, [108.0, 30.6, 1.3, 1430.0], [0.03, 0.05, 0.02, 0.1]):
         assert abs(figures[name]["value"] / truth - 1) < share, figures[name]
     # 500 ns is the factory's.
     assert abs(figures["dead_time"]["value"] / 500 - 1) < 0.1
+    for figure in figures.values():
+        assert set(figure) == {"name", "value", "unit", "confidence", "kept"}
+        assert 0.9 < figure["confidence"] <= 1 and figure["kept"] is False
     assert values(emulator) == [0.0] * 4
     with emulator.connect() as esc:
         esc.wait_rpm(-1, 1)
-
-    ended = siskin(emulator, "identify", "--keep")
+    ended = siskin(emulator, "identify", "--keep", "--json")
     assert ended.returncode == 0, ended.stderr
-    assert [line.split()[0] for line in ended.stdout.splitlines()] == list(figures)
+    again = json.loads(ended.stdout)["items"]
+    assert [figure["name"] for figure in again] == list(figures)
+    assert [figure["name"] for figure in again if figure["kept"]] == FOUND
     kept = values(emulator)
     assert all(value > 0 for value in kept)
     emulator.kill()

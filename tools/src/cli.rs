@@ -56,7 +56,8 @@ pub(crate) enum Command {
         /// Keep the results: MOT_R_MOHM, MOT_L_UH, MOT_FLUX_MWB and MOT_J_GCM2, stored once the shaft stands.
         #[arg(long)]
         keep: bool,
-        /// One JSON object: figures, a list of name, value, unit and spread_percent.
+        /// One JSON object: items, a list of name, value, unit, confidence (1 where all measurements agree, less
+        /// by the largest deviation from their mean) and kept.
         #[arg(long)]
         json: bool,
     },

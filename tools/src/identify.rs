@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use mavlink::dialects::ardupilotmega::{MavCmd, MavResult};
 use serde_json::{Value, json};
+use siskin_control::params::ParamId;
 
 use crate::error::Error;
 use crate::message::Message;
@@ -71,14 +72,13 @@ pub(crate) fn run(
         }
         out.flush()?;
     }
-    if as_json {
-        let figures: Vec<_> = figures.iter().map(Figure::json).collect();
-        writeln!(out, "{}", json!({ "figures": figures }))?;
+    let kept = if keep { self::keep(session) } else { Ok(()) };
+    if as_json && !matches!(kept, Err(Error::Interrupted { .. })) {
+        let is_kept = keep && kept.is_ok();
+        let items: Vec<_> = figures.iter().map(|figure| figure.json(is_kept)).collect();
+        writeln!(out, "{}", json!({ "items": items }))?;
     }
-    if keep {
-        self::keep(session)?;
-    }
-    Ok(())
+    kept
 }
 
 /// Has the motor identified.
@@ -188,12 +188,14 @@ impl Figure {
         })
     }
 
-    fn json(&self) -> Value {
+    /// `kept` tells whether the parameters among the results have been stored.
+    fn json(&self, kept: bool) -> Value {
         json!({
             "name": self.name,
             "value": json::number(self.value),
             "unit": self.unit,
-            "spread_percent": json::number(self.spread_percent),
+            "confidence": json::number((1.0 - self.spread_percent / 100.0).max(0.0)),
+            "kept": kept && ParamId::find(&self.name).is_some(),
         })
     }
 
@@ -220,6 +222,20 @@ mod tests {
         assert_eq!(
             figure.line(),
             "MOT_R_MOHM          107.960 mOhm    within 0.1 %"
+        );
+        let json = |kept| figure.json(kept);
+        assert_eq!(
+            json(true),
+            json!({
+                "name": "MOT_R_MOHM", "value": 107.96, "unit": "mOhm", "confidence": 0.999, "kept": true,
+            })
+        );
+        assert_eq!(json(false)["kept"], false);
+        let other = Figure::parse("dead_time 500 ns 120 %").expect("a line");
+        // It is no parameter, and its measurements do not agree.
+        assert_eq!(
+            (&other.json(true)["kept"], &other.json(true)["confidence"]),
+            (&json!(false), &json!(0.0))
         );
         for line in [
             "",
