@@ -4,6 +4,7 @@ mod answer;
 mod capture;
 mod fit;
 mod machine;
+mod overrides;
 mod reply;
 mod run;
 
@@ -13,8 +14,8 @@ use std::ops::Range;
 use siskin_control::check::{Item, Own, Probe};
 use siskin_control::drive::Sample;
 use siskin_control::esc::{Esc, obey};
-use siskin_control::mavlink::{Receiver, Request};
-use siskin_control::params::{BOSSO_MOTOR, Board, BuildError, ParamId, Params};
+use siskin_control::mavlink::{Frame, Receiver, Request};
+use siskin_control::params::{BOSSO_MOTOR, Board, BuildError, ParamId};
 use siskin_control::record::Record;
 use siskin_control::store::{self, Integrity};
 use siskin_control::throttle::Throttle;
@@ -29,6 +30,7 @@ use crate::summary::Rejected;
 use crate::surroundings::Surroundings;
 use crate::wire::Wire;
 use capture::CAPTURE_HZ;
+use overrides::Overrides;
 use reply::Driven;
 
 pub use crate::machine::Onlooker;
@@ -108,7 +110,7 @@ pub struct Device {
     /// The converters' latest readings; `None` before the first period.
     latest: Option<Sample>,
     flash: FileFlash,
-    overrides: Vec<Override>,
+    overrides: Overrides,
     board: Board,
     link_bytes_per_s: u32,
     receivers: BTreeMap<LinkId, Receiver>,
@@ -122,14 +124,18 @@ pub struct Device {
     record: &'static Record,
 }
 
-/// A parameter from the command line or the bench, which is not stored.
-struct Override {
-    id: ParamId,
-    value: f32,
-    /// True if it only replaces the factory value.
-    is_default: bool,
-    /// The stored value, which stays.
-    stored: f32,
+/// What takes in a client's frames.
+struct Ear<'a> {
+    esc: &'a mut Esc,
+    throttle: &'a mut Throttle,
+    overrides: &'a mut Overrides,
+}
+
+impl Ear<'_> {
+    fn hear(&mut self, now_us: u64, frame: &Frame) {
+        self.esc.receive(self.throttle, now_us, frame);
+        self.overrides.heard(frame, self.esc.params());
+    }
 }
 
 /// The simulated chip for the self-test: its converters' latest sample; it has neither comparators nor clocks.
@@ -194,18 +200,8 @@ impl Device {
             return Err(StartError::CorruptStorage);
         }
         let params = &mut loaded.kept.params;
-        let defaults = defaults.into_iter().map(|given| (given, true));
-        let overrides = overrides.into_iter().map(|given| (given, false));
-        let mut overrides: Vec<_> = defaults
-            .chain(overrides)
-            .map(|((id, value), is_default)| Override {
-                id,
-                value,
-                is_default,
-                stored: params.get(id),
-            })
-            .collect();
-        apply(&mut overrides, params);
+        let mut overrides = Overrides::new(defaults, overrides);
+        overrides.apply(params);
         let board = bench.sensing.board(bench.delay);
         let (mut esc, throttle) = Esc::new(params.clone(), board, CAPTURE_HZ, link_bytes_per_s)?;
         esc.recall(&loaded);
@@ -298,10 +294,14 @@ impl Device {
         let now_ns = self.now_ns();
         let now_us = now_ns / 1000;
         let receiver = self.receivers.entry(stream).or_default();
-        let (esc, throttle) = (&mut self.esc, &mut self.throttle);
+        let mut ear = Ear {
+            esc: &mut self.esc,
+            throttle: &mut self.throttle,
+            overrides: &mut self.overrides,
+        };
         receiver.push(now_us, bytes, |frame| {
             onlooker.frame(now_ns, frame.raw);
-            esc.receive(throttle, now_us, frame);
+            ear.hear(now_us, frame);
         });
     }
 
@@ -366,10 +366,15 @@ impl Device {
     fn tasks(&mut self, now_ns: u64, onlooker: &mut impl Onlooker, send: &mut dyn FnMut(&[u8])) {
         // Receivers learn the time only from bytes: this searches what a false start held back.
         let now_us = now_ns / 1000;
+        let mut ear = Ear {
+            esc: &mut self.esc,
+            throttle: &mut self.throttle,
+            overrides: &mut self.overrides,
+        };
         for receiver in self.receivers.values_mut() {
             receiver.push(now_us, &[], |frame| {
                 onlooker.frame(now_ns, frame.raw);
-                self.esc.receive(&mut self.throttle, now_us, frame);
+                ear.hear(now_us, frame);
             });
         }
         let snapshot = self.rig.snapshot();
@@ -397,22 +402,22 @@ impl Device {
         }
     }
 
-    /// Carries out a storage request; values from the command line remain unstored.
+    /// Carries out a storage request; values from the command line remain unstored, unless somebody has set them.
     fn store(&mut self, request: Request) -> Result<(), &'static str> {
         self.flash.check().map_err(|error| reason(&error))?;
         let mut kept = self.esc.kept();
-        for given in &self.overrides {
-            if kept.params.get(given.id) == given.value {
-                // It was in range when it was stored.
-                let _ = kept.params.set(given.id, given.stored);
-            }
-        }
+        self.overrides.hide(&mut kept.params);
         if obey(request, &mut self.flash, STORE, &mut kept)? {
-            apply(&mut self.overrides, &mut kept.params);
+            if request == Request::FactoryReset {
+                self.overrides.erased();
+            }
+            self.overrides.apply(&mut kept.params);
             self.esc
                 .replace(&mut self.throttle, &mut kept)
                 .map_err(|error| error.reason)?;
             self.configure();
+        } else {
+            self.overrides.saved(&kept.params);
         }
         match request {
             Request::Load => Ok(()),
@@ -440,7 +445,7 @@ impl Device {
     fn reboot(&mut self, power_up: bool) {
         let mut loaded = store::load(&mut self.flash, STORE);
         let params = &mut loaded.kept.params;
-        apply(&mut self.overrides, params);
+        self.overrides.apply(params);
         // What cannot be built now was never in force: the old values stay.
         let Ok((mut esc, mut throttle)) = Esc::new(
             params.clone(),
@@ -476,18 +481,6 @@ fn reason(error: &FlashError) -> &'static str {
     match error {
         FlashError::Gone => "storage: the file was removed or cut",
         _ => "storage: the file cannot be written",
-    }
-}
-
-/// Applies what the command line and the bench set over the stored values. Each value was accepted before.
-fn apply(overrides: &mut [Override], params: &mut Params) {
-    for given in &mut *overrides {
-        given.stored = params.get(given.id);
-    }
-    for given in overrides {
-        if !given.is_default || params.is_default(given.id) {
-            let _ = params.set(given.id, given.value);
-        }
     }
 }
 

@@ -76,6 +76,36 @@ def test_a_kill_while_values_are_stored_leaves_the_old_or_the_new_ones(stored):
     assert found_new > 0, "no save was made"
 
 
+def test_a_kill_after_an_answer_leaves_what_was_stored_though_the_bench_has_the_same(stored):
+    """Of the first bench's motor, and others: each start finds what the last one was told is stored."""
+    chance = random.Random(3)
+    bench = {"MOT_POLE_PAIRS": 12.0, "MOT_R_MOHM": 108.0, "CTL_BW_CUR_HZ": None}
+    emulator = stored()
+    with emulator.connect() as esc:
+        for name in bench:
+            bench[name] = esc.read_param(name).param_value
+    emulator.kill()
+    asked = dict(bench)
+    others = {"MOT_POLE_PAIRS": 14.0, "MOT_R_MOHM": 150.0, "CTL_BW_CUR_HZ": 700.0}
+    # Those of the bench over those of another motor, and one of each.
+    courses = [others, bench, {**others, "MOT_POLE_PAIRS": 12.0}, bench]
+    courses += [
+        {name: chance.choice((bench[name], others[name])) for name in bench} for _ in range(4)
+    ]
+    for course in courses:
+        emulator = stored()
+        with emulator.connect() as esc:
+            time.sleep(TUNE_S)
+            assert {name: esc.read_param(name).param_value for name in bench} == asked
+            for name, value in course.items():
+                esc.set_param(name, value)
+            assert esc.command(STORAGE, 1) == ACCEPTED
+            emulator.kill()
+        asked = course
+    with stored().connect() as esc:
+        assert {name: esc.read_param(name).param_value for name in bench} == asked
+
+
 def test_statistics_outlive_a_kill(stored):
     emulator = stored()
     with emulator.connect() as esc, emulator.throttle() as throttle:

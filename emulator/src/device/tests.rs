@@ -9,6 +9,8 @@ use crate::fault::Kind;
 use crate::rig::Period;
 use crate::wire::WireErrors;
 
+mod overrides;
+
 const MS_NS: u64 = 1_000_000;
 
 fn device(flash: FileFlash, faults: Vec<Fault>) -> Device {
