@@ -17,8 +17,7 @@ use siskin_emulator::plot;
 use siskin_emulator::rack::Rack;
 use siskin_emulator::report;
 use siskin_emulator::reproduce;
-use siskin_emulator::scenario::{Place, Row, Table, Verdict};
-use siskin_emulator::summary::Report;
+use siskin_emulator::scenario::{Row, Run, Table};
 use siskin_emulator::web::WebAddress;
 
 use cli::{BenchArgs, Cli, Command, MatrixArgs, Paper, PlotArgs, ReproduceArgs};
@@ -95,15 +94,16 @@ fn scenario(args: &ScenarioArgs) -> Result<ExitCode, String> {
         let style = ProgressStyle::with_template(PROGRESS).map_err(|error| error.to_string())?;
         let bar = ProgressBar::new(plan.runs() as u64).with_style(style);
         let mut rows = Vec::new();
-        let row = |place: &Place, report: &Report, verdicts: &[Verdict]| {
+        let look = |run: &Run| {
             if wanted {
-                rows.push(Row::of(place, report, verdicts));
+                rows.push(run.row());
             }
         };
-        let survey = plan.survey(&stop, || bar.inc(1), row);
+        let survey = plan.survey(&stop, || bar.inc(1), look);
         bar.finish_and_clear();
-        let survey = survey.map_err(line)?;
+        // Where all are refused, the table says why each was.
         finish(&rows)?;
+        let survey = survey.map_err(line)?;
         report::print(&if args.common.json {
             report::json(&survey)?
         } else {

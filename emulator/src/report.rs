@@ -261,6 +261,16 @@ pub fn survey(survey: &Survey) -> String {
             format_args!("interrupted: {} runs left out", survey.left_out),
         );
     }
+    for refusal in &survey.refusals {
+        line(
+            &mut text,
+            format_args!("refused: {}: {}", refusal.options, refusal.error),
+        );
+    }
+    let more = survey.refused - survey.refusals.len();
+    if more > 0 {
+        line(&mut text, format_args!("refused: {more} more"));
+    }
     for (fault, runs) in &survey.faults {
         line(&mut text, format_args!("fault in {runs}: {fault}"));
     }

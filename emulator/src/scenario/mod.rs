@@ -30,6 +30,7 @@ mod lines;
 mod outcome;
 mod place;
 mod play;
+mod run;
 mod script;
 mod signal;
 mod stand;
@@ -49,7 +50,6 @@ use rayon::prelude::*;
 
 use crate::device::Start;
 use crate::machine::Machine;
-use crate::summary::Report;
 use courses::Courses;
 pub use error::ScenarioError;
 pub use fault::from_text as fault;
@@ -57,9 +57,10 @@ pub use judge::Verdict;
 pub use outcome::Outcome;
 pub use place::Place;
 use play::Played;
+pub use run::Run;
 pub use script::Script;
 pub use stand::{Standing, stand};
-pub use survey::{Expected, Failure, Survey};
+pub use survey::{Expected, Failure, Refusal, Survey};
 pub use table::{Cell, Row, Table};
 use vary::{Case, Variations};
 pub use wire::Wire as ThrottleSignal;
@@ -144,36 +145,38 @@ impl Plan {
         }
     }
 
-    /// Plays all runs on all processors; calls `each` after each of them, and at the end `row` for each in run order.
-    /// Once `stop` is set no run begins or continues: the survey covers those played to their end.
+    /// Plays all runs on all processors; calls `each` after each of them, and at the end `look` for each in run order.
+    /// Once `stop` is set no run begins or continues: the survey covers those played to their end, and those that were
+    /// refused.
     ///
     /// # Errors
-    /// Any [`ScenarioError`] that shows in a run.
+    /// The first run's, if all of them are refused.
     pub fn survey(
         &self,
         stop: &AtomicBool,
         each: impl Fn() + Sync,
-        mut row: impl FnMut(&Place, &Report, &[Verdict]),
+        look: impl FnMut(&Run),
     ) -> Result<Survey, ScenarioError> {
         let began = Instant::now();
-        let played = self.play_each(0..self.runs(), stop, each)?;
-        let left_out = self.runs() - played.len();
-        for (place, played) in &played {
-            row(place, &played.report, &played.verdicts);
-        }
-        Ok(Survey::of(played, left_out, began.elapsed().as_secs_f64()))
+        let runs = self.play_each(0..self.runs(), stop, each)?;
+        let left_out = self.runs() - runs.len();
+        runs.iter().for_each(look);
+        let runs = run::any_played(runs)?;
+        Ok(Survey::of(runs, left_out, began.elapsed().as_secs_f64()))
     }
 
     /// Plays some of the runs on all processors and returns a survey's row for each, in order. Once `stop` is set no
     /// run begins or continues, and theirs are left out.
     ///
     /// # Errors
-    /// Any [`ScenarioError`] that shows in a run.
+    /// The first run's, if these are all, and each of them is refused.
     pub fn rows(&self, runs: Range<usize>, stop: &AtomicBool) -> Result<Vec<Row>, ScenarioError> {
-        let played = self.play_each(runs, stop, || ())?;
-        let rows = played.iter();
-        let rows = rows.map(|(place, played)| Row::of(place, &played.report, &played.verdicts));
-        Ok(rows.collect())
+        let are_all = runs == (0..self.runs());
+        let mut runs = self.play_each(runs, stop, || ())?;
+        if are_all {
+            runs = run::any_played(runs)?;
+        }
+        Ok(runs.iter().map(Run::row).collect())
     }
 
     fn play_each(
@@ -181,19 +184,25 @@ impl Plan {
         runs: Range<usize>,
         stop: &AtomicBool,
         each: impl Fn() + Sync,
-    ) -> Result<Vec<(Place, Played)>, ScenarioError> {
-        let played = runs.into_par_iter().filter_map(|index| {
+    ) -> Result<Vec<Run>, ScenarioError> {
+        let runs = runs.into_par_iter().filter_map(|index| {
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
-            let played = self.play_one(index, stop);
-            if matches!(&played, Ok((_, played)) if played.interrupted) {
+            let run = self.run(index, stop);
+            if matches!(&run, Ok(run) if run.was_interrupted()) {
                 return None;
             }
             each();
-            Some(played)
+            Some(run)
         });
-        played.collect()
+        runs.collect()
+    }
+
+    fn run(&self, index: usize, stop: &AtomicBool) -> Result<Run, ScenarioError> {
+        let Case { place, scenario } = self.case(index)?;
+        let result = play::play(&scenario, self.record.as_deref(), stop);
+        Run::of(place, result)
     }
 
     fn check(&self, index: usize) -> Result<(), ScenarioError> {

@@ -8,7 +8,7 @@ use xxhash_rust::xxh3::Xxh3;
 use super::judge::Verdict;
 use super::outcome::exit_status;
 use super::place::Place;
-use super::play::Played;
+use super::run::Run;
 use crate::summary::Report;
 
 /// Number of failed runs listed individually.
@@ -24,6 +24,9 @@ pub struct Survey {
     pub left_out: usize,
     /// Runs in which an expectation failed.
     pub failed: usize,
+    /// Further runs, which the ESC or the plant refused.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub refused: usize,
     /// Faults that turned the bridge off, each with its number of runs.
     pub faults: BTreeMap<&'static str, usize>,
     /// What was wrong while the motor went on, each with its number of runs.
@@ -43,6 +46,21 @@ pub struct Survey {
     pub expectations: Vec<Expected>,
     /// The first runs that failed.
     pub failures: Vec<Failure>,
+    /// The first runs that were refused.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub refusals: Vec<Refusal>,
+}
+
+/// A run that the ESC or the plant refused.
+#[derive(Clone, Debug, Serialize)]
+pub struct Refusal {
+    /// Which run.
+    #[serde(rename = "where")]
+    pub place: Place,
+    /// The options that reproduce this run alone.
+    pub options: String,
+    /// Why.
+    pub error: String,
 }
 
 /// An expectation over all runs.
@@ -83,15 +101,12 @@ pub struct Failure {
 
 impl Survey {
     /// Sums up these runs, in order.
-    pub(super) fn of(
-        runs: impl IntoIterator<Item = (Place, Played)>,
-        left_out: usize,
-        wall_s: f64,
-    ) -> Self {
+    pub(super) fn of(runs: impl IntoIterator<Item = Run>, left_out: usize, wall_s: f64) -> Self {
         let mut survey = Self {
             runs: 0,
             left_out,
             failed: 0,
+            refused: 0,
             faults: BTreeMap::new(),
             warnings: BTreeMap::new(),
             sim_s: 0.0,
@@ -101,25 +116,42 @@ impl Survey {
             trace_hash: String::new(),
             expectations: Vec::new(),
             failures: Vec::new(),
+            refusals: Vec::new(),
         };
         let mut hash = Xxh3::new();
-        for (place, played) in runs {
-            hash.update(played.report.trace_hash.as_bytes());
-            survey.add(&place, &played.report, played.verdicts);
+        for Run { place, result } in runs {
+            match result {
+                Ok(played) => {
+                    hash.update(played.report.trace_hash.as_bytes());
+                    survey.add(&place, &played.report, played.verdicts);
+                }
+                Err(error) => survey.refuse(place, error.to_string()),
+            }
         }
         survey.trace_hash = format!("{:016x}", hash.digest());
         survey.sim_per_wall = (wall_s > 0.0).then(|| survey.sim_s / wall_s);
         survey
     }
 
-    /// Returns true if every expectation held in every run.
+    /// Returns true if every expectation held in every run, and none was refused.
     pub fn held(&self) -> bool {
-        self.failed == 0
+        self.failed == 0 && self.refused == 0
     }
 
     /// Like [`Outcome::exit_status`](super::Outcome::exit_status).
     pub fn exit_status(&self) -> u8 {
         exit_status(self.left_out > 0, self.held())
+    }
+
+    fn refuse(&mut self, place: Place, error: String) {
+        self.refused += 1;
+        if self.refusals.len() < LISTED {
+            self.refusals.push(Refusal {
+                options: place.to_string(),
+                place,
+                error,
+            });
+        }
     }
 
     fn add(&mut self, place: &Place, report: &Report, verdicts: Vec<Verdict>) {

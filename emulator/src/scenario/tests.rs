@@ -58,7 +58,7 @@ fn a_survey_counts_and_names_the_worst_run() {
             || {
                 played.fetch_add(1, Ordering::Relaxed);
             },
-            |_, _, _| (),
+            |_| (),
         )
         .unwrap();
     assert_eq!(played.into_inner(), 12);
@@ -99,7 +99,7 @@ fn an_interrupt_keeps_what_has_been_played() {
             played.fetch_add(1, Ordering::Relaxed);
             stop.store(true, Ordering::Relaxed);
         },
-        |_, _, _| (),
+        |_| (),
     );
     let survey = survey.unwrap();
     // Runs in parallel with the first are cut short, unless they have ended too.
@@ -133,7 +133,7 @@ fn threads_and_order_change_nothing() {
         let survey = pool
             .build()
             .unwrap()
-            .install(|| plan.survey(&AtomicBool::new(false), || (), |_, _, _| ()));
+            .install(|| plan.survey(&AtomicBool::new(false), || (), |_| ()));
         let mut survey = serde_json::to_value(survey.unwrap()).unwrap();
         for key in ["wall_s", "sim_per_wall"] {
             survey[key].take();
@@ -146,11 +146,9 @@ fn threads_and_order_change_nothing() {
 #[test]
 fn seeds_make_other_runs() {
     let hash = |first, last| {
-        plan(FILE, &seeds(first, last)).unwrap().survey(
-            &AtomicBool::new(false),
-            || (),
-            |_, _, _| (),
-        )
+        plan(FILE, &seeds(first, last))
+            .unwrap()
+            .survey(&AtomicBool::new(false), || (), |_| ())
     };
     let hash = |first, last| hash(first, last).unwrap().trace_hash;
     assert_eq!(hash(1, 1), hash(1, 1));
@@ -175,17 +173,56 @@ fn a_run_without_the_figure_is_the_worst() {
         [sweep]
         "window.0.t0_s" = [0.0, 0.00999]
     "#;
-    let survey = plan(text, &Options::default()).unwrap().survey(
-        &AtomicBool::new(false),
-        || (),
-        |_, _, _| (),
-    );
+    let survey =
+        plan(text, &Options::default())
+            .unwrap()
+            .survey(&AtomicBool::new(false), || (), |_| ());
     let survey = survey.unwrap();
     assert_eq!((survey.failed, survey.expectations[0].worst), (1, None));
     assert_eq!(
         survey.expectations[0].options,
         "--seed 1 --set window.0.t0_s=0.00999"
     );
+}
+
+#[test]
+fn a_run_that_the_esc_refuses_ends_no_other() {
+    let text = r#"
+        [bench]
+        duration_s = 0.01
+        [[expect]]
+        window = "run"
+        key = "faults"
+        equals = 0.0
+        [sweep]
+        "params.CTL_RPM_MIN" = [7000.0, 300.0]
+        "params.CTL_RPM_MAX" = [6000.0, 9000.0]
+    "#;
+    let plan = plan(text, &Options::default()).unwrap();
+    let mut rows = Vec::new();
+    let survey = plan.survey(&AtomicBool::new(false), || (), |run| rows.push(run.row()));
+    let survey = survey.unwrap();
+    assert_eq!((survey.runs, survey.failed, survey.refused), (3, 0, 1));
+    assert_eq!(survey.exit_status(), 1);
+    let refusal = &survey.refusals[0];
+    assert!(refusal.error.contains("CTL_RPM_MIN"), "{refusal:?}");
+    let again = "--seed 1 --set params.CTL_RPM_MAX=6000.0 --set params.CTL_RPM_MIN=7000.0";
+    assert_eq!(refusal.options, again);
+    let held: Vec<_> = rows.iter().map(|row| row.cell("held").clone()).collect();
+    let wanted = plan.rows(0..4, &AtomicBool::new(false)).unwrap();
+    assert_eq!(rows, wanted);
+    let refused = rows
+        .iter()
+        .position(|row| matches!(row.cell("error"), Cell::Text(why) if *why == refusal.error));
+    assert_eq!(
+        held.iter().position(|held| *held == Cell::Flag(false)),
+        refused
+    );
+    // Where nothing can be played, something is wrong with the file.
+    let all = text.replace(", 300.0", "").replace(", 9000.0", "");
+    let refused = self::plan(&all, &Options::default()).unwrap();
+    let error = refused.survey(&AtomicBool::new(false), || (), |_| ());
+    assert!(error.unwrap_err().to_string().contains("CTL_RPM_MIN"));
 }
 
 #[test]

@@ -21,6 +21,8 @@ Cells: TypeAlias = list[tuple[str, Cell]]
 class Table(Sequence[Mapping[str, Cell]]):
     """A row for each run: its seed, the swept or drawn keys, every figure of every window, and the verdicts.
 
+    A run that was refused has none of the figures: it is not ``held``, and ``error`` says why.
+
     ``table[0]["held"]`` says whether all expectations of the first run held; ``table["steady.rpm_mean"]`` is a column.
     ``pandas.DataFrame(list(table))`` makes a data frame of it. Two tables are equal if every bit of them is.
     """
@@ -62,7 +64,9 @@ class Table(Sequence[Mapping[str, Cell]]):
     @property
     def columns(self) -> list[str]:
         """The names of all columns, in order."""
-        return list(dict.fromkeys(name for row in self._rows for name, _ in row))
+        names = dict.fromkeys(name for row in self._rows for name, _ in row)
+        last = {"held": 1, "error": 2}
+        return sorted(names, key=lambda name: last.get(name, 0))
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Writes the table as CSV, byte for byte what the program writes with ``--table``.

@@ -6,6 +6,10 @@ use crate::scenario::judge::Verdict;
 use crate::scenario::place::Place;
 use crate::summary::Report;
 
+/// The last columns: whether all expectations held, and why a run was refused, if one was.
+const HELD: &str = "held";
+const ERROR: &str = "error";
+
 /// A value in a row.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
@@ -26,11 +30,26 @@ pub enum Cell {
 pub struct Row(pub(super) Vec<(String, Cell)>);
 
 impl Row {
+    /// Creates the row of a run that was refused: it did not hold, for this reason.
+    pub fn refused(place: &Place, error: &str) -> Self {
+        let mut cells = Self::placed(place);
+        cells.extend([
+            (HELD.to_owned(), Cell::Flag(false)),
+            (ERROR.to_owned(), Cell::Text(error.to_owned())),
+        ]);
+        Self(cells)
+    }
+
+    fn placed(place: &Place) -> Vec<(String, Cell)> {
+        let keys = place.set.iter().chain(&place.drawn);
+        let keys = keys.map(|(key, value)| (key.clone(), Cell::of_key(value)));
+        let seed = ("seed".to_owned(), Cell::Whole(place.seed));
+        [seed].into_iter().chain(keys).collect()
+    }
+
     /// Creates the row of a run.
     pub fn of(place: &Place, report: &Report, verdicts: &[Verdict]) -> Self {
-        let mut cells = vec![("seed".to_owned(), Cell::Whole(place.seed))];
-        let keys = place.set.iter().chain(&place.drawn);
-        cells.extend(keys.map(|(key, value)| (key.clone(), Cell::of_key(value))));
+        let mut cells = Self::placed(place);
         let faults = report.faults.iter().flatten().copied();
         let faults: Vec<_> = faults.collect();
         cells.extend([
@@ -64,7 +83,7 @@ impl Row {
             cells.push((format!("{window}.{key} {wanted}"), held));
         }
         let held = !verdicts.iter().any(Verdict::failed);
-        cells.push(("held".to_owned(), Cell::Flag(held)));
+        cells.push((HELD.to_owned(), Cell::Flag(held)));
         Self(cells)
     }
 
@@ -78,7 +97,7 @@ impl Row {
         &self.0
     }
 
-    pub(super) fn cell(&self, column: &str) -> &Cell {
+    pub(in crate::scenario) fn cell(&self, column: &str) -> &Cell {
         let cell = self.0.iter().find(|(name, _)| name == column);
         cell.map_or(&Cell::Nothing, |(_, cell)| cell)
     }
@@ -104,7 +123,7 @@ impl Cell {
     }
 }
 
-/// Returns the names of all cells, in order of appearance.
+/// Returns the names of all cells, in order of appearance, whatever a refused run lacks: the verdicts come last.
 pub(super) fn columns(rows: &[Row]) -> Vec<String> {
     let mut columns: Vec<String> = Vec::new();
     for (name, _) in rows.iter().flat_map(|row| &row.0) {
@@ -112,5 +131,10 @@ pub(super) fn columns(rows: &[Row]) -> Vec<String> {
             columns.push(name.clone());
         }
     }
+    columns.sort_by_key(|name| match name.as_str() {
+        HELD => 1,
+        ERROR => 2,
+        _ => 0,
+    });
     columns
 }
