@@ -4,6 +4,8 @@ mod clock;
 mod request;
 mod state;
 
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use crate::live::{LiveError, Opened, Session};
@@ -32,7 +34,7 @@ pub fn serve(
     warnings.into_iter().for_each(&warn);
     opened(&open.about, &rack);
 
-    let mut clock = Clock::default();
+    let mut clock = Clock::new(Arc::clone(&open.stop));
     let mut request = Vec::new();
     while open.goes_on() && rack.now_ns() < open.end_ns {
         let now_ns = rack.now_ns();
@@ -45,10 +47,14 @@ pub fn serve(
             continue;
         };
         let links = &mut open.links;
-        let obeyed = clock.obey(&request, &mut rack, &mut open.watches, &mut |frame| {
+        let mut send = |frame: &[u8]| {
             // A peer without room loses the frame, as on any datagram link.
             links.send(frame);
-        });
+        };
+        let obeyed = clock.obey(&request, &mut rack, &mut open.watches, &mut send);
+        if open.stop.load(Ordering::Relaxed) {
+            break;
+        }
         if let Err(malformed) = obeyed
             && clock.refused() == 1
         {

@@ -91,7 +91,7 @@ impl Rack {
         &self.escs
     }
 
-    /// Returns how far [`Rack::advance_to`] has advanced, ns.
+    /// Returns how far [`Rack::go_on_to`] has advanced, ns.
     pub fn now_ns(&self) -> u64 {
         self.now_ns
     }
@@ -134,25 +134,14 @@ impl Rack {
         }
     }
 
-    /// Runs all control periods that begin before `until_ns`; the result does not depend on how a time is divided into
-    /// calls. `send` receives every MAVLink frame.
-    pub fn advance_to(
-        &mut self,
-        until_ns: u64,
-        onlooker: &mut impl Onlooker,
-        send: &mut dyn FnMut(&[u8]),
-    ) {
-        self.begin();
-        self.go_on_to(until_ns, onlooker, send);
-    }
-
     /// Begins an advance that [`Rack::go_on_to`] makes in several strides: answers and means cover all of them.
     pub fn begin(&mut self) {
         self.answers.clear();
         self.means_are_old = true;
     }
 
-    /// Continues an advance, as [`Rack::advance_to`] does.
+    /// Runs all control periods that begin before `until_ns`; the result does not depend on how a time is divided into
+    /// calls. `send` receives every MAVLink frame.
     pub fn go_on_to(
         &mut self,
         until_ns: u64,

@@ -12,7 +12,7 @@ use siskin_control::drive::{Bridge, Sample, Snapshot};
 
 use crate::bench::Bench;
 use crate::fault::InForce;
-use crate::plant::{Air, Bus, Flow, Gate, Noise, Plant, Sensing, Thermal, Truth};
+use crate::plant::{Air, Bus, Flow, Gate, Noise, Plant, RUNAWAY_RAD_S, Sensing, Thermal, Truth};
 
 /// Expected length of the first period, s.
 const USUAL_S: f64 = 1.0 / 24_000.0;
@@ -318,9 +318,10 @@ impl Surroundings {
 }
 
 impl Motion {
-    /// Returns true if the plant's numbers are no longer finite.
+    /// Returns true if the plant's numbers are no longer finite, or the shaft has run away.
     pub fn diverged(&self) -> bool {
-        !(self.speed_rad_s.is_finite() && self.flow.torque_nm.is_finite())
+        let turns = self.speed_rad_s.abs() < RUNAWAY_RAD_S;
+        !(turns && self.flow.torque_nm.is_finite())
     }
 
     /// Returns the estimated less true electrical angle, degrees, ±180.

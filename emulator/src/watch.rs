@@ -24,11 +24,15 @@ pub enum WatchError {
 /// Why what is simulated is void; one line.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum Void {
-    /// The simulated motor has diverged.
+    /// The simulated motor has diverged, or its shaft has run away.
     #[error(
-        "the simulated motor diverged: its inertia is too small for its load and the PWM frequency"
+        "the simulated motor diverged at {t_s:.6} s, beyond a million rpm: its inertia is too small for its load, for \
+         a torque on the shaft, or for the PWM frequency"
     )]
-    Diverged,
+    Diverged {
+        /// When, s.
+        t_s: f64,
+    },
     /// Both switches of a leg are on, which no command may do.
     #[error(
         "both switches of the leg of phase {phase} are on at {t_s:.6} s: there is no dead time between them"
@@ -45,7 +49,7 @@ impl Void {
     /// Returns why a period makes the run void, if it does.
     pub fn of(t_s: f64, period: &Period, rig: &Rig) -> Option<Self> {
         if period.motion.diverged() {
-            return Some(Self::Diverged);
+            return Some(Self::Diverged { t_s });
         }
         let phase = rig.plant().crossed()?;
         Some(Self::Both { phase, t_s })
@@ -149,6 +153,11 @@ impl Onlooker for Watches {
 }
 
 impl Watch {
+    /// The first reason counts: what follows from it comes in the same slice.
+    fn fail(&mut self, void: Void) {
+        self.failed.get_or_insert(void.into());
+    }
+
     fn record(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), RecordError>) {
         if let Some(recorder) = &mut self.recorder
             && self.failed.is_none()
@@ -162,7 +171,7 @@ impl Onlooker for Watch {
     fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
         self.summary.add(t_s, period, rig);
         if let Some(void) = Void::of(t_s, period, rig) {
-            self.failed = Some(void.into());
+            self.fail(void);
         }
         self.record(|recorder| recorder.period(t_s, period, rig));
     }
@@ -170,7 +179,7 @@ impl Onlooker for Watch {
     fn passage(&mut self, t_s: f64, passage: &Passage) {
         self.summary.pass(t_s, passage);
         if passage.motion.diverged() {
-            self.failed = Some(Void::Diverged.into());
+            self.fail(Void::Diverged { t_s });
         }
         self.record(|recorder| recorder.passage(t_s, passage));
     }
@@ -178,7 +187,7 @@ impl Onlooker for Watch {
     fn gates(&mut self, time_ns: u64, leg: usize, gate: Gate) {
         if gate.shoots() {
             let t_s = time_ns as f64 * 1e-9;
-            self.failed = Some(Void::Both { phase: leg, t_s }.into());
+            self.fail(Void::Both { phase: leg, t_s });
         }
         self.record(|recorder| recorder.gates(time_ns, leg, gate));
     }

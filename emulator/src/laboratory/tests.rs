@@ -64,6 +64,44 @@ fn however_time_is_cut_it_is_the_same() {
     );
 }
 
+/// On each plant, and with a motor that is not ideal.
+#[test]
+fn a_shaft_that_runs_away_ends_the_run_at_once_and_says_when() {
+    for plant in ["averaged", "switching"] {
+        let mut bench = toml::Table::new();
+        bench.insert("plant".to_owned(), plant.into());
+        let standing = stand("whoop", bench).unwrap();
+        let (mut laboratory, _) = Laboratory::set_up(Setup {
+            bench: standing.bench,
+            params: standing.params,
+            ..setup(1)
+        })
+        .unwrap();
+        laboratory.go_on_to(400 * MS).unwrap();
+        let shaft = Shaft {
+            torque_nm: Some(100.0),
+            wind_rpm: None,
+        };
+        let change = Environment {
+            shafts: vec![shaft],
+            ..Environment::default()
+        };
+        laboratory.surround(&change).unwrap();
+        let began = std::time::Instant::now();
+        let line = laboratory.go_on_to(3000 * MS).unwrap_err().to_string();
+        assert!(
+            began.elapsed().as_secs_f64() < 1.0,
+            "{plant}: {:?}",
+            began.elapsed()
+        );
+        let at = line.strip_prefix("the simulated motor diverged at 0.40");
+        assert!(
+            at.is_some() && line.contains("a torque on the shaft"),
+            "{line}"
+        );
+    }
+}
+
 #[test]
 fn an_advance_in_several_strides_has_all_answers_and_one_mean() {
     let (mut whole, mut cut) = (laboratory(1), laboratory(1));

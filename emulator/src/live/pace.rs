@@ -8,6 +8,10 @@ const SLICE: Duration = Duration::from_millis(1);
 /// Lag behind the wall clock that is dropped rather than caught up: the machine slept.
 const GIVEN_UP: Duration = Duration::from_millis(500);
 
+/// The most that is simulated between two looks at the sockets and at a request to end, ns: it takes less than a second
+/// for eight ESCs with every switching edge, on a slow machine.
+const LONGEST_SLICE_NS: u64 = 20_000_000;
+
 /// A control period at the lowest PWM frequency, 8 kHz, plus a margin, ns.
 const LONGEST_PERIOD_NS: u64 = 130_000;
 
@@ -40,8 +44,7 @@ impl Pacer {
     /// Returns how far to simulate now, in slices of a millisecond of wall time.
     pub(super) fn until_ns(&mut self, now_ns: u64) -> u64 {
         let Pace::Times(times) = self.pace else {
-            // The sockets are read once per 20 ms of simulation, which takes less than one.
-            return now_ns + 20_000_000;
+            return now_ns + LONGEST_SLICE_NS;
         };
         let wall = self.began.elapsed();
         let due_ns = self.met.1 + ((wall - self.met.0).as_secs_f64() * times * 1e9) as u64;
@@ -62,8 +65,8 @@ impl Pacer {
     }
 }
 
-/// Returns what is simulated in a millisecond of wall time; in slow motion at least a control
-/// period.
+/// Returns what is simulated in a millisecond of wall time, as far as that is not too much at once; in slow motion at
+/// least a control period.
 fn slice_ns(times: f64) -> u64 {
-    ((SLICE.as_nanos() as f64 * times) as u64).max(LONGEST_PERIOD_NS)
+    ((SLICE.as_nanos() as f64 * times) as u64).clamp(LONGEST_PERIOD_NS, LONGEST_SLICE_NS)
 }

@@ -1,21 +1,37 @@
 //! The rack's clock under a client's control: each request in its turn, answered by the state.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use super::request::{Malformed, Request, Turn, parse};
 use super::state::{self, Head};
 use crate::machine::Onlooker;
 use crate::rack::Rack;
 
+/// Simulated time between two looks at the request to end, ns.
+const STRIDE_NS: u64 = 20_000_000;
+
 /// A client's position in the sequence.
-#[derive(Default)]
 pub(super) struct Clock {
+    /// Set once the program is to end.
+    stop: Arc<AtomicBool>,
     head: Head,
     /// The answer to the latest request obeyed.
     state: Vec<u8>,
 }
 
 impl Clock {
+    /// Creates a clock that stops in an advance too once this is set.
+    pub(super) fn new(stop: Arc<AtomicBool>) -> Self {
+        Self {
+            stop,
+            head: Head::default(),
+            state: Vec::new(),
+        }
+    }
+
     /// Obeys a request if it is its turn, and says what is wrong with a malformed one. Either way [`Clock::answer`]
-    /// then goes to the sender.
+    /// then goes to the sender, unless the request to end has cut the advance short.
     pub(super) fn obey(
         &mut self,
         request: &[u8],
@@ -36,7 +52,12 @@ impl Clock {
                             // If it finds no room, its wire counts it, as any.
                             let _ = rack.play(frame.esc, start_ns, frame.datagram);
                         }
-                        rack.advance_to(now_ns + u64::from(time_ns), onlooker, send);
+                        let until_ns = now_ns + u64::from(time_ns);
+                        rack.begin();
+                        while rack.now_ns() < until_ns && !self.stop.load(Ordering::Relaxed) {
+                            let stride_ns = until_ns.min(rack.now_ns() + STRIDE_NS);
+                            rack.go_on_to(stride_ns, onlooker, send);
+                        }
                     }
                     Turn::Change(environment) => rack.surround(&environment),
                 }

@@ -14,6 +14,9 @@ use super::thermal::Warming;
 use super::vector::{back, largest, phases, turn};
 use super::{Cogging, Drag, Extras, Load, Motor};
 
+/// The speed at which the simulation ends, rad/s: a million rpm, five times what a scenario may impose.
+pub const RUNAWAY_RAD_S: f64 = 1e6 * TAU / 60.0;
+
 /// Means over a period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Flow {
@@ -354,8 +357,8 @@ impl Machine {
                 let (load, inertia) = (&self.load, self.inertia_kgm2);
                 let push = shaft.push(load, inertia, speeds, torque_nm, period_s);
                 drag_w = push.drag_w;
-                self.acceleration = push.acceleration;
-                self.speed_rad_s = settle(self.speed_rad_s + period_s * self.acceleration);
+                [self.speed_rad_s, self.acceleration] =
+                    accelerated(self.speed_rad_s, push.acceleration, period_s);
             }
         } else if self.held_rad_s.is_none() {
             // The load by the trapezoidal rule, stable however stiff the load.
@@ -363,8 +366,9 @@ impl Machine {
             let inertia = self.inertia_kgm2 + 0.5 * period_s * damping;
             let torque = torque_nm - damping * self.speed_rad_s;
             // The division need not wait for the torque.
-            self.acceleration = torque * (1.0 / inertia);
-            self.speed_rad_s = settle(self.speed_rad_s + period_s * self.acceleration);
+            let acceleration = torque * (1.0 / inertia);
+            [self.speed_rad_s, self.acceleration] =
+                accelerated(self.speed_rad_s, acceleration, period_s);
         }
         let flow = Flow {
             torque_nm,
@@ -380,4 +384,15 @@ impl Machine {
         }
         flow
     }
+}
+
+/// Returns the speed after a period, and the acceleration to go on with. A runaway stays at the end of what is
+/// simulated: the steps of a period grow with the speed, and so would the wait for whoever finds out.
+#[inline(always)] // in each period
+fn accelerated(speed_rad_s: f64, acceleration: f64, period_s: f64) -> [f64; 2] {
+    let speed_rad_s = settle(speed_rad_s + period_s * acceleration);
+    if speed_rad_s.abs() > RUNAWAY_RAD_S {
+        return [RUNAWAY_RAD_S.copysign(speed_rad_s), 0.0];
+    }
+    [speed_rad_s, acceleration]
 }

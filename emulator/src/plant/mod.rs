@@ -38,7 +38,7 @@ pub use extras::{Cogging, Drag, Extras, Harmonic, Winding};
 pub use gates::{Gate, Gates};
 pub use inverter::{Fidelity, Plant};
 pub use load::Load;
-pub use machine::Flow;
+pub use machine::{Flow, RUNAWAY_RAD_S};
 pub use motor::Motor;
 pub use noise::{Noise, share_of};
 pub use rail::Rail;
