@@ -32,6 +32,11 @@ pub(crate) struct Cli {
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     pub(crate) component: Option<u8>,
 
+    /// File with the ESC's signing key, as 'siskin key new' makes it: signs what is sent, and believes only what is
+    /// signed.
+    #[arg(id = "sign-key", long, global = true, value_name = "FILE")]
+    pub(crate) sign_key: Option<PathBuf>,
+
     #[command(subcommand)]
     pub(crate) command: Command,
 }
@@ -61,6 +66,11 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Make a signing key, give it to the ESC, or take it away.
+    ///
+    /// An ESC with a key lets anyone read, but is changed and turned only by frames that are signed with it.
+    #[command(subcommand)]
+    Key(KeyCommand),
     /// Show the last faults, and what the control did just before one; kept across a reset, not across a
     /// power-down.
     ///
@@ -109,6 +119,28 @@ pub(crate) enum Command {
     /// Uses probe-rs through a debug probe (the B-G431B-ESC1 has one on it), or dfu-util over USB with BOOT0 at
     /// 3.3 V. Stored parameters and option bytes stay.
     Flash(FlashArgs),
+}
+
+/// What to do with a signing key.
+#[derive(Debug, Subcommand)]
+pub(crate) enum KeyCommand {
+    /// Make a file with a new random key.
+    New {
+        /// The key that MAVProxy and other ground stations make of a passphrase, which is read from standard input.
+        #[arg(long)]
+        passphrase: bool,
+        /// File to make; it must not exist.
+        file: PathBuf,
+    },
+    /// Give the ESC the key in a file, and store it. Over a link that others hear, they have it too.
+    ///
+    /// If the ESC has another key, name that one's file with --sign-key.
+    Set {
+        /// File with the key.
+        file: PathBuf,
+    },
+    /// Take the key that --sign-key names away from the ESC, and store that.
+    Remove,
 }
 
 /// What to do with parameters.

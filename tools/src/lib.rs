@@ -16,6 +16,7 @@ mod identify;
 mod image;
 mod interrupt;
 mod json;
+mod key;
 mod link;
 mod message;
 mod monitor;
@@ -29,6 +30,7 @@ mod progress;
 mod sample;
 mod scope;
 mod session;
+mod signing;
 mod step_by_step;
 mod tune;
 
@@ -40,11 +42,12 @@ use clap::error::ErrorKind::{DisplayHelpOnMissingArgumentOrSubcommand, UnknownAr
 use clap::parser::ValueSource;
 use clap::{Arg, CommandFactory, FromArgMatches};
 
-use cli::{Cli, Command};
+use cli::{Cli, Command, KeyCommand};
 use error::Error;
 use link::Link;
 use param_commands::Task;
 use session::Session;
+use signing::Signer;
 
 /// Runs the command given by the program's arguments.
 pub fn main() -> ExitCode {
@@ -73,12 +76,12 @@ pub fn main() -> ExitCode {
 
 /// Commands that work without an ESC, and which of the options that select one they do not take.
 const WITHOUT_ESC: [(&str, &[&str]); 5] = [
-    ("decode", &["connect", "system", "component"]),
+    ("decode", &["connect", "system", "component", "sign-key"]),
     // --component selects one of several ESCs in a file.
-    ("budget", &["connect", "system"]),
-    ("tune", &["connect", "system"]),
-    ("image", &["connect", "system", "component"]),
-    ("flash", &["connect", "system", "component"]),
+    ("budget", &["connect", "system", "sign-key"]),
+    ("tune", &["connect", "system", "sign-key"]),
+    ("image", &["connect", "system", "component", "sign-key"]),
+    ("flash", &["connect", "system", "component", "sign-key"]),
 ];
 
 /// Parses the arguments; options a command does not take are hidden in its help and refused.
@@ -108,7 +111,11 @@ fn parse() -> Result<Cli, clap::Error> {
 fn run(cli: &Cli) -> Result<(), Error> {
     let mut out = io::stdout().lock();
     let mut complaints = io::stderr().lock();
-    let find = || Session::find(Link::open(&cli.connect)?, cli.system, cli.component);
+    let find = || {
+        let signer = cli.sign_key.as_deref().map(Signer::open).transpose()?;
+        let link = Link::open(&cli.connect)?;
+        Session::find(link, (cli.system, cli.component), signer)
+    };
     match &cli.command {
         Command::Params(command) => {
             let task = Task::check(command, &mut complaints)?;
@@ -116,6 +123,15 @@ fn run(cli: &Cli) -> Result<(), Error> {
         }
         Command::Check { json } => check::run(&mut find()?, *json, &mut out),
         Command::Identify { keep, json } => identify::run(&mut find()?, (*keep, *json), &mut out),
+        Command::Key(KeyCommand::New { file, passphrase }) => key::new(file, *passphrase, &mut out),
+        Command::Key(KeyCommand::Set { file }) => {
+            let signer = Signer::open(file)?;
+            key::set(&mut find()?, signer, file, &mut out)
+        }
+        Command::Key(KeyCommand::Remove) => {
+            key::check_remove(cli.sign_key.as_deref())?;
+            key::remove(&mut find()?, &mut out)
+        }
         Command::Faults(args) => faults::run(&mut find()?, args, &mut out),
         Command::Decode(args) => decode::run(&args.capture, &args.options, &mut out),
         Command::Budget(args) => budget::run(args, cli.component, &mut out),

@@ -20,6 +20,8 @@ pub(crate) fn name_of(address: Address) -> String {
 pub(crate) struct Incoming {
     pub(crate) from: Address,
     pub(crate) message: Message,
+    /// The whole frame of a heartbeat, which shows whether the sender signs; empty for others.
+    pub(crate) raw: Vec<u8>,
 }
 
 /// The messages that this program uses.

@@ -213,7 +213,11 @@ pub(crate) fn set(session: &mut Session, name: &str, value: f32) -> Result<SetOu
     if last.is_none() && reasons.error != Some(MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST) {
         last = Some(get(session, name)?);
     }
-    Ok(SetOutcome::Refused(reasons.told(last)))
+    let mut told = reasons.told(last);
+    if session.lacks_key() {
+        told += "; the ESC has a signing key, give --sign-key FILE";
+    }
+    Ok(SetOutcome::Refused(told))
 }
 
 /// What the ESC said about a value that was sent.
@@ -346,6 +350,9 @@ pub(crate) fn storage(session: &mut Session, what: Storage) -> Result<(), Error>
     }
     let why = match result {
         BUSY => "not now; stop the motor and try again",
+        MavResult::MAV_RESULT_DENIED if session.lacks_key() => {
+            "denied: it has a signing key; give --sign-key FILE"
+        }
         MavResult::MAV_RESULT_DENIED => "denied",
         MavResult::MAV_RESULT_UNSUPPORTED => "this component stores nothing",
         _ => failed,

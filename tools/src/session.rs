@@ -4,15 +4,16 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use mavlink::dialects::ardupilotmega::{
-    HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavState, MavType,
+    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState, MavType,
 };
-use mavlink::{MAVLinkV2MessageRaw, MavHeader, MessageData};
-use siskin_control::mavlink::{Address, Receiver};
+use mavlink::{MAVLinkV2MessageRaw, MavHeader, Message as _, MessageData};
+use siskin_control::mavlink::{Address, Frame, Receiver};
 
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::link::Link;
 use crate::message::{Incoming, Message, Texts, name_of};
+use crate::signing::{self, Key, Signer};
 
 /// This program on the network: a ground station with its customary ids.
 const OWN: MavHeader = MavHeader {
@@ -51,17 +52,22 @@ pub(crate) struct Session {
     target: Address,
     /// What a signal has to end first.
     interrupt: Option<Interrupt>,
+    /// Signs what is sent, and judges what is heard.
+    signer: Option<Signer>,
+    /// The ESC's latest frame, for who has signed it.
+    latest: Vec<u8>,
 }
 
 impl Session {
-    /// Waits for the heartbeat of the wanted component, or of the first that may be an ESC.
+    /// Waits for the heartbeat of the wanted component, or of the first that may be an ESC. With a signer, it must be
+    /// signed with its key.
     ///
     /// # Errors
-    /// [`Error::NoComponent`] with what was heard instead.
+    /// [`Error::NoComponent`] with what was heard instead, [`Error::Refused`] if the ESC has another key or none.
     pub(crate) fn find(
         link: Link,
-        system: Option<u8>,
-        component: Option<u8>,
+        (system, component): (Option<u8>, Option<u8>),
+        signer: Option<Signer>,
     ) -> Result<Self, Error> {
         let mut session = Self {
             link,
@@ -76,6 +82,9 @@ impl Session {
                 component: 0,
             },
             interrupt: None,
+            // Not before the ESC is known to have the key.
+            signer: None,
+            latest: Vec::new(),
         };
         session.greet()?;
         let named = system.is_some() || component.is_some();
@@ -90,6 +99,8 @@ impl Session {
                 && component.is_none_or(|n| n == from.component);
             if wanted && (named || heartbeat.may_be_esc()) {
                 session.target = from;
+                session.latest = incoming.raw;
+                session.begin_signing(signer)?;
                 // A UDP vehicle that waits to be spoken to has heard the first greeting; one that speaks first
                 // is known only now.
                 session.greet()?;
@@ -103,6 +114,52 @@ impl Session {
             endpoint: session.link.endpoint().to_string(),
             heard: explain_silence(&others, named),
         })
+    }
+
+    /// Signs from now on, if the ESC has the same key.
+    fn begin_signing(&mut self, signer: Option<Signer>) -> Result<(), Error> {
+        let Some(signer) = signer else {
+            return Ok(());
+        };
+        let reason = match (self.is_signed(), self.is_signed_with(signer.key())) {
+            (_, true) => {
+                self.sign(Some(signer));
+                return Ok(());
+            }
+            (false, _) => {
+                "it has no key; leave --sign-key out, or give it this one: siskin key set FILE"
+            }
+            (true, _) => "it is signed with another key; name its file with --sign-key",
+        };
+        Err(Error::Refused {
+            what: name_of(self.target),
+            reason: reason.into(),
+        })
+    }
+
+    /// Signs from now on, or no longer; only what is signed with the same key is believed.
+    pub(crate) fn sign(&mut self, signer: Option<Signer>) {
+        self.signer = signer;
+    }
+
+    /// Returns a timestamp for a new key, if what is sent is signed.
+    pub(crate) fn stamp(&mut self) -> Option<u64> {
+        self.signer.as_mut().map(Signer::stamp)
+    }
+
+    /// Returns true if the ESC signs.
+    pub(crate) fn is_signed(&self) -> bool {
+        signing::is_signed(&self.latest)
+    }
+
+    /// Returns true if the ESC signs with this key.
+    pub(crate) fn is_signed_with(&self, key: &Key) -> bool {
+        signing::fits(key, &self.latest)
+    }
+
+    /// Returns true if the ESC has a key, and this program has not: it may only read.
+    pub(crate) fn lacks_key(&self) -> bool {
+        self.is_signed() && self.signer.is_none()
     }
 
     /// Returns the ESC being talked to.
@@ -150,7 +207,14 @@ impl Session {
             message,
         );
         self.sequence = self.sequence.wrapping_add(1);
-        self.link.send(frame.raw_bytes())
+        self.send_frame(frame.raw_bytes(), extra(message))
+    }
+
+    fn send_frame(&mut self, frame: &[u8], extra: u8) -> Result<(), Error> {
+        match &mut self.signer {
+            Some(signer) => self.link.send(&signer.sign(frame, extra)),
+            None => self.link.send(frame),
+        }
     }
 
     /// Waits at most `wait` for bytes, and passes on the frames that they complete: whole frames of the ESC's
@@ -166,20 +230,33 @@ impl Session {
         let mut buffer = [0; 2048];
         let length = self.link.receive(&mut buffer, wait)?;
         let (now_us, system) = (self.now_us(), self.target.system);
+        let signer = &mut self.signer;
         self.receiver.push(now_us, &buffer[..length], |frame| {
-            if frame.from.system == system {
+            if frame.from.system == system && believes(signer, frame) {
                 hand_on(frame.raw);
             }
         });
         Ok(())
     }
 
-    /// Sends another client's bytes.
+    /// Sends another client's bytes; where frames are signed, its whole frames.
     ///
     /// # Errors
     /// As [`Link::send`].
     pub(crate) fn pass(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        self.link.send(bytes)
+        if self.signer.is_none() {
+            return self.link.send(bytes);
+        }
+        let mut frames = Vec::new();
+        Receiver::new().push(0, bytes, |frame| {
+            if !signing::is_signed(frame.raw) {
+                frames.push((frame.id, frame.raw.to_vec()));
+            }
+        });
+        for (id, frame) in frames {
+            self.send_frame(&frame, MavMessage::extra_crc(id))?;
+        }
+        Ok(())
     }
 
     /// Returns the time since the start, µs.
@@ -204,6 +281,20 @@ impl Session {
         }
     }
 
+    /// Waits for bytes of the ESC, for a moment at most; false after the deadline.
+    ///
+    /// # Errors
+    /// As [`Link::receive`].
+    pub(crate) fn hear(&mut self, deadline: Instant) -> Result<bool, Error> {
+        let left = deadline.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Ok(false);
+        }
+        self.arrived.clear();
+        self.fill(left)?;
+        Ok(true)
+    }
+
     /// Waits for bytes, but no longer than the receiver may go without a call.
     fn fill(&mut self, wait: Duration) -> Result<(), Error> {
         if let Some(signal) = self.interrupt.as_ref().and_then(Interrupt::take) {
@@ -217,8 +308,21 @@ impl Session {
         let length = self.link.receive(&mut buffer, wait.min(RECEIVER_PERIOD))?;
         let now_us = self.now_us();
         let (arrived, texts, told) = (&mut self.arrived, &mut self.texts, &mut self.told);
+        let (signer, latest, target) = (&mut self.signer, &mut self.latest, self.target);
         self.receiver.push(now_us, &buffer[..length], |frame| {
             let from = frame.from;
+            if from == target {
+                // Whatever key it is signed with: a new one shows here.
+                frame.raw.clone_into(latest);
+                if !believes(signer, frame) {
+                    return;
+                }
+            }
+            let raw = if frame.id == HEARTBEAT_DATA::ID {
+                frame.raw.to_vec()
+            } else {
+                Vec::new()
+            };
             let message = match Message::read(frame.id, frame.payload) {
                 Some(Message::StatusText(piece)) => {
                     let whole = texts.join(from, piece);
@@ -227,7 +331,7 @@ impl Session {
                 }
                 other => other,
             };
-            arrived.extend(message.map(|message| Incoming { from, message }));
+            arrived.extend(message.map(|message| Incoming { from, message, raw }));
         });
         let excess = self.told.len().saturating_sub(TOLD);
         self.told.drain(..excess);
@@ -287,6 +391,17 @@ impl Session {
             attempts: ATTEMPTS,
         })
     }
+}
+
+fn believes(signer: &mut Option<Signer>, frame: &Frame) -> bool {
+    signer
+        .as_mut()
+        .is_none_or(|signer| signer.believes(frame.raw))
+}
+
+/// Returns the byte of a message's check that its fields make.
+fn extra<D: MessageData>(_: &D) -> u8 {
+    D::EXTRA_CRC
 }
 
 fn explain_silence(others: &[Address], named: bool) -> String {

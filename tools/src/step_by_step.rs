@@ -179,7 +179,9 @@ pub(crate) fn why(result: MavResult) -> &'static str {
         MavResult::MAV_RESULT_UNSUPPORTED => {
             "this component has none: is its image older than this program?"
         }
-        MavResult::MAV_RESULT_DENIED => "denied; is the link signed with a key?",
+        MavResult::MAV_RESULT_DENIED => {
+            "denied; an ESC that has a signing key needs --sign-key FILE"
+        }
         _ => "ended by the ESC",
     }
 }
