@@ -1,7 +1,6 @@
 //! ESCs in simulated time, driven by a Python program.
 
 use std::path::PathBuf;
-use std::sync::Mutex;
 
 use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
@@ -15,6 +14,7 @@ use siskin_emulator::watch::Void;
 
 use crate::Error;
 use crate::convert::to_table;
+use crate::held::{Held, Unusable};
 use crate::state::{EscState, Reply};
 
 /// Simulated time between two checks for Ctrl-C, ns: some milliseconds of wall time.
@@ -26,7 +26,7 @@ const ADVANCE_MAX_S: f64 = 1e6;
 /// Several ESCs on one clock, one supply and one MAVLink stream.
 #[pyclass(frozen, module = "siskin._siskin")]
 pub(crate) struct Laboratory {
-    inner: Mutex<laboratory::Laboratory>,
+    inner: Held<laboratory::Laboratory>,
     escs: usize,
     /// Warnings at the start.
     #[pyo3(get)]
@@ -36,15 +36,20 @@ pub(crate) struct Laboratory {
 impl Laboratory {
     /// Runs `work` on the ESCs while Python's other threads run, one of which may hold them.
     ///
-    /// Refuses after a panic, which may have left the ESCs half updated.
+    /// Refuses after a panic, and in a process forked while another thread used them.
     fn with<T: Send>(
         &self,
         py: Python<'_>,
         work: impl FnOnce(&mut laboratory::Laboratory) -> T + Send,
     ) -> PyResult<T> {
-        py.detach(|| match self.inner.lock() {
-            Ok(mut inner) => Ok(work(&mut inner)),
-            Err(_) => Err(wrong("the emulator has failed; create a new one")),
+        let worked = py.detach(|| self.inner.with(work));
+        worked.map_err(|unusable| {
+            wrong(match unusable {
+                Unusable::Failed => "the emulator has failed; create a new one",
+                Unusable::Forked => {
+                    "the process was forked while another thread advanced this emulator; create one after the fork"
+                }
+            })
         })
     }
 
@@ -115,7 +120,7 @@ impl Laboratory {
         };
         let (inner, warnings) = laboratory::Laboratory::set_up(setup).map_err(wrong)?;
         Ok(Self {
-            inner: Mutex::new(inner),
+            inner: Held::new(inner),
             escs,
             warnings,
         })

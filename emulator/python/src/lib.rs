@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 mod convert;
+mod held;
 mod interrupt;
 mod laboratory;
 mod plan;

@@ -1,7 +1,9 @@
 //! Scenarios played by a Python program.
 
+use std::num::NonZero;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
+use std::thread;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -10,6 +12,9 @@ use siskin_emulator::scenario::{self, Options, Row, Table};
 
 use crate::convert::{cells, row, to_table};
 use crate::{Error, interrupt};
+
+/// The most threads per core: a run that waits for nothing gains nothing by more.
+const THREADS_PER_CORE: usize = 4;
 
 /// A scenario that has been read and validated.
 #[pyclass(frozen, module = "siskin._siskin")]
@@ -45,7 +50,10 @@ impl Plan {
             set: to_table(given)?.into_iter().collect(),
             record,
         };
-        let plan = py.detach(|| scenario::Plan::read(&path, &options));
+        // The threads shared by a whole process are lost in one that is forked.
+        let pool = ThreadPoolBuilder::new().build();
+        let pool = pool.map_err(|error| wrong(&path, error))?;
+        let plan = py.detach(|| pool.install(|| scenario::Plan::read(&path, &options)));
         match plan {
             Ok(plan) => Ok(Self { plan, path }),
             Err(error) => Err(wrong(&path, error)),
@@ -74,7 +82,11 @@ impl Plan {
         threads: Option<usize>,
     ) -> PyResult<Vec<Bound<'py, PyList>>> {
         let runs = first..end.min(self.plan.runs());
-        let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0));
+        // More than these wait for each other.
+        let cores = thread::available_parallelism().map_or(1, NonZero::get);
+        let most = runs.len().clamp(1, THREADS_PER_CORE * cores);
+        let threads = threads.unwrap_or(cores).clamp(1, most);
+        let pool = ThreadPoolBuilder::new().num_threads(threads);
         let pool = pool.build().map_err(|error| self.wrong(error))?;
         let play = |stop: &AtomicBool| pool.install(|| self.plan.rows(runs, stop));
         let rows = interrupt::run(py, play)?.map_err(|error| self.wrong(error))?;
