@@ -145,7 +145,57 @@ def test_a_fixed_key_is_not_swept(grid):
     assert len(table) == 2 and set(table["signal.0.rpm"]) == {3000.0}
 
 
-@pytest.mark.parametrize("seeds", [range(5, 5), range(1, 9, 2), range(-1, 4)])
+def test_seeds_are_any_sequence_of_consecutive_ones(grid):
+    wanted = siskin.sweep(grid, seeds=range(1, 4))
+    for seeds in ([1, 2, 3], (1, 2, 3), np.arange(1, 4)):
+        assert siskin.sweep(grid, seeds=seeds) == wanted
+
+
+def test_threads_are_as_many_as_there_is_work_for(grid):
+    """Counted by the system while they play."""
+    most = 0
+    done = threading.Event()
+
+    def look():
+        nonlocal most
+        while not done.wait(0.005):
+            most = max(most, len(os.listdir("/proc/self/task")))
+
+    watcher = threading.Thread(target=look)
+    watcher.start()
+    before = len(os.listdir("/proc/self/task"))
+    table = siskin.sweep(grid, threads=10**30)
+    done.set()
+    watcher.join()
+    assert len(table) == 6 and table == siskin.sweep(grid, threads=1)
+    # The sweep's own thread beside them.
+    assert before < most <= before + 6 + 1
+    for threads in (0, -1, 1.5, "2"):
+        with pytest.raises(siskin.Error, match="give a whole number from 1"):
+            siskin.sweep(grid, threads=threads)
+
+
+def test_a_run_that_is_refused_is_a_row(grid):
+    text = grid.read_text().replace("[random]", '"params.CTL_RPM_MIN" = [300.0, 7000.0]\n[random]')
+    grid.write_text(text)
+    table = siskin.sweep(grid)
+    assert len(table) == 12 and table.columns[-2:] == ["held", "error"]
+    refused = [row for row in table if row.get("error")]
+    assert len(refused) == 6 and all(row["params.CTL_RPM_MIN"] == 7000 for row in refused)
+    assert all("CTL_RPM_MIN" in row["error"] and row["held"] is False for row in refused)
+    assert np.isnan(table["end.rpm_mean"]).sum() == 6
+
+
+@pytest.mark.parametrize("seed", [-1, 2**64, 1.5, "1"])
+def test_a_seed_is_a_whole_number(seed):
+    with pytest.raises(siskin.Error, match="give a whole number from 0"):
+        siskin.scenario(SCENARIOS / "steps.toml", seed=seed)
+
+
+@pytest.mark.parametrize(
+    "seeds",
+    [range(5, 5), range(1, 9, 2), range(-1, 4), [], [1, 3], [2, 1], 5, "12", [2**64], range(1, 10**30, 2)],
+)
 def test_seeds_are_without_gaps(grid, seeds):
     with pytest.raises(siskin.Error, match="give consecutive seeds"):
         siskin.sweep(grid, seeds=seeds)

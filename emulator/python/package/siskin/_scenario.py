@@ -4,9 +4,10 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Any
 
-from ._siskin import Plan
+from ._siskin import Error, Plan
 
 
 @dataclass(frozen=True)
@@ -60,5 +61,7 @@ def scenario(
         array entries count from 0. ``**more`` are further ones.
     :raises siskin.Error: if the scenario is invalid or cannot be played, with the program's text.
     """
+    if seed is not None and not (isinstance(seed, Integral) and 0 <= seed < 2**64):
+        raise Error(f"seed = {seed}: give a whole number from 0 to 2^64 - 1")
     seeds = None if seed is None else (seed, seed)
     return Outcome(json.loads(Plan(path, seeds, {**(overrides or {}), **more}, record).play()))

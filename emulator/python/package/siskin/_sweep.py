@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
 from typing import Any, TypeAlias, overload
 
@@ -14,6 +15,9 @@ from ._siskin import Error, Plan, write_table
 
 Cell: TypeAlias = None | bool | int | float | str
 """A value in a row."""
+
+SEEDS = 2**64
+"""Seeds are below it."""
 
 Cells: TypeAlias = list[tuple[str, Cell]]
 
@@ -81,7 +85,7 @@ def sweep(
     overrides: Mapping[str, Any] | None = None,
     /,
     *,
-    seeds: range | None = None,
+    seeds: Sequence[int] | None = None,
     threads: int | None = None,
     client: Any = None,
     retries: int = 3,
@@ -90,8 +94,9 @@ def sweep(
     """Plays all runs of a scenario, on all cores or on a cluster; the table is the same, bit for bit.
 
     :param path: the scenario, a TOML file.
-    :param seeds: plays it once for each of these seeds, as ``range(1, 201)``.
-    :param threads: number of runs at once on this machine; all cores if left out.
+    :param seeds: plays it once for each of these seeds, consecutive ones as ``range(1, 201)``.
+    :param threads: number of runs at once on this machine, as far as there are runs, and at most four per core; one per
+        core if left out.
     :param client: a ``dask.distributed.Client``, whose workers play the runs. They must find the scenario, and the
         files that it names, under the same path.
     :param retries: how often the cluster retries a part that has failed.
@@ -99,9 +104,11 @@ def sweep(
     :raises siskin.Error: if the scenario is invalid or cannot be played, with the program's text.
     """
     ends, given = _ends(seeds), {**(overrides or {}), **more}
+    if threads is not None and not (isinstance(threads, Integral) and threads >= 1):
+        raise Error(f"threads = {threads}: give a whole number from 1")
     if client is None:
         plan = Plan(path, ends, given, None)
-        return Table(plan.rows(0, plan.runs, threads))
+        return Table(plan.rows(0, plan.runs, None if threads is None else min(int(threads), plan.runs)))
     if threads is not None:
         raise Error("threads applies to this machine and client to a cluster; give one of them")
     return Table(_on_cluster(client, Path(path).resolve(), ends, given, retries))
@@ -139,12 +146,20 @@ def _hash(path: Path) -> str:
         raise Error(f"{path}: {error.strerror}") from error
 
 
-def _ends(seeds: range | None) -> tuple[int, int] | None:
+def _ends(seeds: Sequence[int] | None) -> tuple[int, int] | None:
     if seeds is None:
         return None
-    if seeds.step != 1 or not seeds or seeds[0] < 0:
+    try:
+        given = seeds if isinstance(seeds, range) else list(seeds)
+        ends = int(given[0]), int(given[-1])
+        consecutive = range(ends[0], ends[0] + len(given))
+        # A long range is compared by its ends.
+        are_consecutive = given == (consecutive if isinstance(given, range) else [*consecutive])
+    except (TypeError, ValueError, IndexError, OverflowError):
+        are_consecutive = False
+    if not are_consecutive or not 0 <= ends[0] <= ends[1] < SEEDS:
         raise Error(f"seeds = {seeds}: give consecutive seeds, such as range(1, 201)")
-    return seeds[0], seeds[-1]
+    return ends
 
 
 def _array(values: list[Cell]) -> np.ndarray[Any, np.dtype[Any]]:
