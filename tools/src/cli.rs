@@ -172,9 +172,9 @@ pub(crate) enum ParamsCommand {
         /// File to compare with, as 'siskin params load' reads it.
         file: Option<PathBuf>,
     },
-    /// Return parameters to their factory values.
+    /// Return parameters to their factory values; the ESC stores that by itself within seconds.
     Reset {
-        /// Store all parameters in the ESC afterwards.
+        /// Store that now, and wait until it would survive a loss of power.
         #[arg(long)]
         store: bool,
         /// Reset all of them, and erase everything else that is stored except the statistics: the signing key
@@ -199,9 +199,10 @@ pub(crate) enum ParamsCommand {
         /// File to write, usually NAME.param.
         file: PathBuf,
     },
-    /// Set the parameters in a file; reads MAVProxy's, Mission Planner's and QGroundControl's files.
+    /// Set the parameters in a file; the ESC stores them by itself within seconds. Reads MAVProxy's, Mission Planner's
+    /// and QGroundControl's files.
     Load {
-        /// Store all parameters in the ESC afterwards, if none was refused.
+        /// Store them now, if none was refused, and wait until they would survive a loss of power.
         #[arg(long)]
         store: bool,
         /// File to read.
