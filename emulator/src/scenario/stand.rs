@@ -37,18 +37,23 @@ pub fn stand(base: &str, given: Table) -> Result<Standing, ScenarioError> {
         name.map_or_else(|| format!("that of {base}"), str::to_owned)
     };
     let names = [name("motor"), name("load")];
-    // If the bench sets none, the inverter's dead time is that of the parameters.
-    let waits = root
+    let states_dead_time = root
         .get("bench")
         .is_some_and(|bench| bench.get("dead_time_ns").is_some());
     let scenario = Scenario::understand(root)?;
     let mut bench = scenario.bench.bench()?;
-    if !waits {
+    let params = scenario.params()?;
+    // The bridge of a bench that states none, or the one that the ESC sets, has what is set while it runs too; any
+    // other is one that the ESC does not know of.
+    let mut own = params.iter().rev();
+    let own = own.find(|(id, _)| *id == ParamId::PwmDeadtimeNs);
+    let own_ns = own.map_or(ParamId::PwmDeadtimeNs.entry().default, |(_, value)| *value);
+    if !states_dead_time || scenario.bench.dead_time_ns == f64::from(own_ns) {
         bench.dead_time_s = None;
     }
     Ok(Standing {
         bench,
-        params: scenario.params()?,
+        params,
         names,
     })
 }
@@ -91,6 +96,10 @@ mod tests {
                     "{name}: {value} {truth}"
                 );
             };
+            // In a scenario, where it stands whatever is set, and in other runs, where it follows what is set.
+            let ns = believed.get(ParamId::PwmDeadtimeNs);
+            assert_eq!(bench.dead_time_s, None, "{name}");
+            assert_eq!(scenario_dead_time_ns(name), f64::from(ns), "{name}");
             let inertia = bench.motor.inertia_kgm2 + bench.load.inertia_kgm2;
             believes(ParamId::MotPolePairs, bench.motor.pole_pairs.into(), name);
             believes(ParamId::MotRMohm, 1e3 * bench.motor.resistance_ohm, name);
@@ -98,6 +107,23 @@ mod tests {
             believes(ParamId::MotFluxMwb, 1e3 * bench.motor.flux_wb, name);
             believes(ParamId::MotJGcm2, 1e7 * inertia, name);
         }
+    }
+
+    fn scenario_dead_time_ns(base: &str) -> f64 {
+        let root: Table = toml::from_str(&format!("[bench]\nbase = \"{base}\"")).unwrap();
+        let stated = Scenario::complete(root.clone(), Path::new("")).unwrap();
+        assert!(stated["bench"].get("dead_time_ns").is_some(), "{base}");
+        let scenario = Scenario::read(root, Path::new("")).unwrap();
+        let dead_time_s = scenario.bench.bench().unwrap().dead_time_s;
+        libm::round(1e9 * dead_time_s.unwrap())
+    }
+
+    /// In other runs too: the ESC does not know of it.
+    #[test]
+    fn a_dead_time_that_the_esc_does_not_set_stands() {
+        let given = Table::from_iter([("dead_time_ns".to_owned(), Value::Float(400.0))]);
+        let standing = stand("quad-3-inch", given).unwrap();
+        assert_eq!(standing.bench.dead_time_s, Some(400.0 * 1e-9));
     }
 
     /// As the control's README has it: φ/L bounds i_q in braking on three benches, and 1.5·φ/L in driving on none.
