@@ -24,6 +24,9 @@ use crate::session::Session;
 /// How long to wait on the link, and so how long a page may wait.
 const LOOK: Duration = Duration::from_millis(5);
 
+/// How often the end of a test or an identification is sent: nobody waits for an answer, and a frame may be lost.
+const ENDS: usize = 3;
+
 /// Interval of our own heartbeat, without which some links forget us.
 const GREETING_PERIOD: Duration = Duration::from_secs(1);
 
@@ -78,9 +81,17 @@ pub(crate) fn run(
     let mut turners = Turners::default();
     let served = serve(&mut session, &site, &mut turners, &stop);
     // However it ends, nobody holds a button any more.
-    for end in turners.end(|_| true) {
-        // If the link is lost, the ESC's own three seconds end a test.
-        let _ = session.send(&end);
+    let ends = turners.end(|_| true);
+    for _ in 0..ENDS {
+        for end in &ends {
+            // If the link is lost, the ESC's own three seconds end a test.
+            let _ = session.send(end);
+        }
+        let heard = Instant::now() + LOOK;
+        while let Ok(Some(_)) = session.next(heard) {}
+    }
+    if !ends.is_empty() {
+        writeln!(out, "ended what a page had a motor do")?;
     }
     served
 }
