@@ -121,7 +121,7 @@ impl Esc {
                     Ok(()) => self.component.report_step("done"),
                     Err(reason) => self.warn_in_pieces("Not identified: ", [reason, "", ""]),
                 }
-                self.component.check_done(result.is_ok());
+                self.component.identification_done(result.is_ok());
             }
         }
     }

@@ -44,7 +44,7 @@ impl Esc {
             Act::AbandonIdentification => self.end_identification("its client is gone"),
             Act::KeepIdentified => {
                 let kept = self.keep_identified();
-                self.component.check_done(kept);
+                self.component.identification_done(kept);
             }
             Act::EndCalibration => throttle.lock(|throttle| throttle.calibrate(now_us, false)),
         }

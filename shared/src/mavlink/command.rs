@@ -26,9 +26,9 @@ const CONFIGURE_ACTUATOR: u16 = MavCmd::MAV_CMD_CONFIGURE_ACTUATOR as u16;
 const PREFLIGHT_CALIBRATION: u16 = MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION as u16;
 const PREFLIGHT_STORAGE: u16 = MavCmd::MAV_CMD_PREFLIGHT_STORAGE as u16;
 const PREFLIGHT_REBOOT_SHUTDOWN: u16 = MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN as u16;
-const RUN_PREARM_CHECKS: u16 = MavCmd::MAV_CMD_RUN_PREARM_CHECKS as u16;
+pub(super) const RUN_PREARM_CHECKS: u16 = MavCmd::MAV_CMD_RUN_PREARM_CHECKS as u16;
 /// The dialect has none for it.
-const IDENTIFY: u16 = MavCmd::MAV_CMD_USER_1 as u16;
+pub(super) const IDENTIFY: u16 = MavCmd::MAV_CMD_USER_1 as u16;
 const COMPONENT_ARM_DISARM: u16 = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16;
 /// By number: the dialect marks it as superseded, but clients still send it.
 const GET_MESSAGE_INTERVAL: u16 = 510;
@@ -368,7 +368,7 @@ impl Commands {
     }
 
     /// Ends the given command with a result, if it is under way.
-    fn end(&mut self, number: u16, result: MavResult, replies: &mut Replies) {
+    pub(super) fn end(&mut self, number: u16, result: MavResult, replies: &mut Replies) {
         if let Some(command) = self.under_way.take_if(|command| command.number == number) {
             self.last = Some((command, result));
             replies.ack(command.from, command.number, result);

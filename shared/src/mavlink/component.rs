@@ -8,7 +8,7 @@ use mavlink::dialects::ardupilotmega::{
     PARAM_SET_DATA, SETUP_SIGNING_DATA,
 };
 
-use super::command::{ACCEPTED, Command, Commands, FAILED};
+use super::command::{ACCEPTED, Command, Commands, FAILED, IDENTIFY, RUN_PREARM_CHECKS};
 use super::faults::Announcer;
 use super::frame::Address;
 use super::frame::Frame;
@@ -316,8 +316,17 @@ impl Component {
 
     /// Reports the end of a self-test, and acknowledges the command for it, if any.
     pub fn check_done(&mut self, passed: bool) {
-        let result = if passed { ACCEPTED } else { FAILED };
-        self.commands.end_check(result, &mut self.replies);
+        self.measured(RUN_PREARM_CHECKS, passed);
+    }
+
+    /// Reports the end of an identification, or of keeping its results, likewise.
+    pub fn identification_done(&mut self, succeeded: bool) {
+        self.measured(IDENTIFY, succeeded);
+    }
+
+    fn measured(&mut self, command: u16, succeeded: bool) {
+        let result = if succeeded { ACCEPTED } else { FAILED };
+        self.commands.end(command, result, &mut self.replies);
     }
 
     /// Warns the user at the next poll. Two can wait; of more, the first are kept.

@@ -82,7 +82,7 @@ pub enum Act {
     EndIdentification,
     /// End it since the client that began it is gone.
     AbandonIdentification,
-    /// Keep its results; [`Component::check_done`](super::Component::check_done) reports it.
+    /// Keep its results; [`Component::identification_done`](super::Component::identification_done) reports it.
     KeepIdentified,
     /// Begin a self-test; [`Component::report_progress`](super::Component::report_progress) and
     /// [`Component::check_done`](super::Component::check_done) report it.

@@ -104,13 +104,6 @@ impl Commands {
     pub(super) fn checks(&self) -> bool {
         self.under_way.as_ref().is_some_and(measures)
     }
-
-    /// Ends the requested self-test, if any, with this result.
-    pub(in super::super) fn end_check(&mut self, result: MavResult, replies: &mut Replies) {
-        for number in [RUN_PREARM_CHECKS, IDENTIFY] {
-            self.end(number, result, replies);
-        }
-    }
 }
 
 fn measures(command: &Command) -> bool {

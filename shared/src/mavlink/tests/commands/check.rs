@@ -4,6 +4,7 @@ use super::*;
 
 const IN_PROGRESS: u8 = MavResult::MAV_RESULT_IN_PROGRESS as u8;
 const RUN: u16 = 401;
+const IDENTIFY: u16 = 31010;
 
 /// Returns result and progress of the one ACK.
 fn ack(sent: &[Sent]) -> (u8, u8) {
@@ -40,6 +41,16 @@ fn a_self_test_is_acknowledged_step_by_step() {
         bench.component.report_progress(50);
         assert_eq!(bench.answers().len(), 0);
     }
+}
+
+#[test]
+fn the_end_of_another_self_test_is_not_an_identification_s() {
+    let mut bench = Bench::new();
+    assert_eq!(ack(&bench.command(IDENTIFY, &[1.0])), (IN_PROGRESS, 255));
+    bench.component.check_done(true);
+    assert_eq!(acks(&bench.answers()), []);
+    bench.component.identification_done(true);
+    assert_eq!(ack(&bench.answers()), (ACCEPTED as u8, 0));
 }
 
 #[test]
