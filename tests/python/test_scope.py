@@ -2,7 +2,6 @@
 
 import csv
 import http.client
-import json
 import re
 import time
 from xml.etree import ElementTree
@@ -11,10 +10,8 @@ import pytest
 
 from browser import TIMEOUT_S, Browser
 from dshot import HALF
-from emulator import free_port, run
-
-HOLD_RPM = 3150
-"""Half throttle in the speed mode's range from 300 to 6000 rpm."""
+from emulator import run
+from scope import HOLD_RPM, browser, esc, look, play, port, spin  # noqa: F401  (fixtures)
 
 UPGRADE = {
     "Upgrade": "websocket",
@@ -22,54 +19,6 @@ UPGRADE = {
     "Sec-WebSocket-Version": "13",
     "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
 }
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with Browser() as browser:
-        yield browser
-
-
-@pytest.fixture
-def port():
-    return free_port()
-
-
-@pytest.fixture
-def esc(start, port, browser):
-    """An ESC with a page, as a MAVLink client sees it."""
-    emulator = start(web=f"127.0.0.1:{port}")
-    with emulator.connect() as esc:
-        esc.emulator = emulator
-        yield esc
-        # A page left open would keep looking for its program.
-        browser.open("about:blank")
-
-
-def look(browser, port):
-    """Opens the page and waits until it shows something."""
-    browser.open(f"http://127.0.0.1:{port}/")
-    browser.wait("document.querySelector('#state').textContent === 'connected'")
-    browser.wait("/^-?\\d+$/.test(document.querySelector('#tile-rpm').textContent)")
-
-
-def spin(browser, esc, escs=(0,), components=(1,)) -> tuple[float, float]:
-    """Arms, and holds the throttle at its middle until the motor has that speed; returns where the mouse holds it.
-
-    On a busy machine the page may fail for 200 ms to report that it is held, which means zero: whenever that happens
-    it is taken again.
-    """
-    for _ in range(8):
-        if browser.text("#arm") == "Arm":
-            browser.click("#arm")
-        browser.wait("document.querySelector('#drive').textContent.includes('armed')")
-        for component in components:
-            esc.next("HEARTBEAT", lambda m: m.get_srcComponent() == component and m.base_mode & 128)
-        at = browser.press("#throttle", 0.5)
-        if esc.wait("ESC_STATUS", lambda m: all(abs(m.rpm[i] - HOLD_RPM) < 60 for i in escs), esc.mark(), 5.0):
-            return at
-        browser.mouse("mouseReleased", *at)
-    raise AssertionError(f"never at {HOLD_RPM} rpm: {browser.text('#events')}")
 
 
 def test_it_loads_and_its_traces_move(browser, esc, port):
@@ -352,17 +301,6 @@ signal = [
 ]
 fault = [{ at_s = 3.0, for_s = 0.3, kind = "bus_sag", value = 2.0 }]
 """
-
-
-def play(browser, text):
-    """Gives the page a scenario file."""
-    browser.run(f"""{{
-        const files = new DataTransfer();
-        files.items.add(new File([{json.dumps(text)}], "some.toml"));
-        const input = document.querySelector("#scenario");
-        input.files = files.files;
-        input.dispatchEvent(new Event("change"));
-    }}""")
 
 
 def test_a_scenario_is_played_on_what_runs(browser, esc, port):
