@@ -4,13 +4,21 @@ const ANSWER_MS = 1500;
 const REAL32 = 9;
 const RESULTS = ["accepted", "temporarily rejected", "denied", "not supported", "failed", "in progress", "cancelled"];
 const IN_PROGRESS = 5;
+/** MAV_STATE. */
+const ACTIVE = 4;
 const FTP = { terminate: 1, open: 4, read: 5, ack: 128 };
 const FTP_DATA = 12;
+/** A reason stands in a text of its own, close to the result. */
+const REASON_MS = 300;
+/** So many texts are remembered for that. */
+const TEXTS = 20;
 
 export class Esc extends EventTarget {
   constructor(link, system, component) {
     super();
-    Object.assign(this, { link, system, component, params: new Map(), count: 0, waiting: [], sequence: 0 });
+    Object.assign(this, { link, system, component, params: new Map(), count: 0, waiting: [], sequence: 0, texts: [] });
+    /** As the heartbeat last told: names of the faults, and MAV_STATE. */
+    Object.assign(this, { faults: [], state: 0 });
   }
 
   send(name, message) {
@@ -24,6 +32,38 @@ export class Esc extends EventTarget {
       this.dispatchEvent(new CustomEvent("param", { detail: message.param_id }));
     }
     this.waiting = this.waiting.filter((look) => !look(message));
+  }
+
+  /** It has told a whole text. */
+  said(text) {
+    this.texts.push({ text, at: performance.now() });
+    if (this.texts.length > TEXTS) this.texts.shift();
+    this.dispatchEvent(new CustomEvent("text", { detail: text }));
+  }
+
+  /** What follows `begin` in the first text since a time that begins so; empty if there is none soon. */
+  async reason(begin, since) {
+    const found = () => this.texts.find(({ text, at }) => at >= since && text.startsWith(begin))?.text.slice(begin.length);
+    if (found() === undefined) {
+      await new Promise((resolve) => {
+        const heard = () => { if (found() !== undefined) end(); };
+        const end = () => {
+          clearTimeout(timer);
+          this.removeEventListener("text", heard);
+          resolve();
+        };
+        const timer = setTimeout(end, REASON_MS);
+        this.addEventListener("text", heard);
+      });
+    }
+    return found() ?? "";
+  }
+
+  /** What keeps it from a test now. */
+  get hindrance() {
+    if (this.faults.length) return `a fault holds: ${this.faults.join(", ")}`;
+    if (this.state === ACTIVE) return "the motor turns, or the throttle is open";
+    return "it needs a motor at rest, no fault, and the throttle at zero or unplugged";
   }
 
   /** The first message for which `match` gives something, or null in time. */

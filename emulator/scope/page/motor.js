@@ -31,8 +31,8 @@ export class MotorTest {
     this.of = esc;
     this.show();
     const result = await esc.command(ACTUATOR_TEST, [Number(element("test-value").value) / 100, LONGEST_S]);
-    const why = result === "temporarily rejected" ? ": it needs a motor at rest, no fault, and the throttle at zero or unplugged" : "";
-    if (result !== "accepted") this.told(`Motor test: ${result}${why}`, true);
+    const told = result === "temporarily rejected" ? `refused, ${esc.hindrance}` : result;
+    if (result !== "accepted") this.told(`Motor test: ${told}`, true);
   }
 
   end() {

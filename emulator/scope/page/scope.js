@@ -99,6 +99,7 @@ const plots = new Plots(element("plots"), element("plot-choice"), (from, to) => 
 const texts = new Texts(({ component, text, severity }) => {
   const of = escs.size > 1 && escs.has(component) ? `ESC ${components().indexOf(component) + 1}: ` : "";
   told(of + text, severity <= WARNING);
+  escs.get(component)?.said(text);
 });
 const remote = new Remote(link);
 const samples = new Samples();
@@ -189,8 +190,10 @@ function heartbeat(message) {
   }
   const esc = escs.get(component);
   esc.isArmed = Boolean(base_mode & ARMED);
-  if (!hello || !current()) return;
-  const faults = named(message.custom_mode, hello.faults);
+  esc.state = system_status;
+  if (!hello) return;
+  const faults = (esc.faults = named(message.custom_mode, hello.faults));
+  if (!current()) return;
   fleet.faults(components().indexOf(component), faults);
   if (esc !== current()) return;
   tiles.conditions(faults, named(message.custom_mode, hello.limits));
@@ -227,7 +230,10 @@ function seen({ values }) {
   element("plane").hidden = !hello.simulated && i_d == null;
   drawPhasor({ i_d, i_q, u_d, u_q });
   const faults = last("faults");
-  tiles.traces({ values }, faults == null ? null : named(faults, hello.faults));
+  const names = faults == null ? null : named(faults, hello.faults);
+  // The traces tell it sooner than the heartbeat.
+  if (names && current()) current().faults = names;
+  tiles.traces({ values }, names);
   if (hello.simulated) drive(hello.phases[last("phase")] ?? "");
 }
 

@@ -5,6 +5,11 @@ const IDENTIFY = 31010;
 const END = 0;
 const BEGIN = 1;
 const KEEP = 2;
+/** Results with which there is something new to read, and the one that depends on the ESC's state. */
+const CARRIED_OUT = ["accepted", "failed"];
+const REFUSED = "temporarily rejected";
+/** The ESC's text on why begins so. */
+const NOT_NOW = "Not now: ";
 
 const element = (id) => document.getElementById(id);
 
@@ -38,13 +43,22 @@ export class Tests {
     bar.hidden = false;
     bar.value = 0;
     this.told(`${name} begins`);
+    const begun = performance.now();
     const result = await esc.command(command, params, (percent) => { if (percent <= 100) bar.value = percent; });
-    this.told(`${name}: ${result}`, result !== "accepted");
-    const text = await esc.file(path);
+    const outcome = await this.outcome(esc, result, begun);
+    this.told(`${name}: ${outcome}`, result !== "accepted");
+    // What was not carried out leaves the file of the time before.
+    const text = CARRIED_OUT.includes(result) ? await esc.file(path) : `${name}: ${outcome}`;
     bar.hidden = true;
     buttons.forEach((button) => { button.disabled = false; });
     report.hidden = !text;
     report.textContent = text ?? "";
     return result;
+  }
+
+  /** The result in words: of a refusal with the reason, the ESC's own or what is known of its state. */
+  async outcome(esc, result, begun) {
+    if (result !== REFUSED) return result;
+    return `refused, ${(await esc.reason(NOT_NOW, begun)) || esc.hindrance}`;
   }
 }
