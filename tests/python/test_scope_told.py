@@ -1,5 +1,7 @@
 """What the page tells a person: why something was refused, what state the ESC is in, what is known no more."""
 
+import json
+
 from scope import browser, esc, look, port, spin  # noqa: F401  (fixtures)
 
 EVENTS = "document.querySelector('#events').textContent"
@@ -32,4 +34,33 @@ def test_a_refused_test_says_so_and_why_in_place_of_the_last_one_s_lines(browser
     browser.wait(f"{report} === 'Self-test: refused, a fault holds: over-current'")
     assert "Self-test: refused, a fault holds" in browser.text("#events")
     browser.mouse("mouseReleased", *at)
+    assert browser.problems == []
+
+
+def test_a_refused_parameter_is_named_with_the_reason(browser, esc, port):
+    look(browser, port)
+    browser.wait("document.querySelector('#param-state').textContent.includes('parameters')")
+    browser.click("#show-parameters")
+    browser.run("""{
+        const input = document.querySelector('#param-LIM_PHASE_A');
+        input.value = -5;
+        input.dispatchEvent(new Event('change'));
+    }""")
+    row = "document.querySelector('#param-LIM_PHASE_A').closest('.param')"
+    browser.wait(f"{row}.innerText.includes('LIM_PHASE_A: -5 was refused, out of range; give ')")
+    assert browser.run("Number(document.querySelector('#param-LIM_PHASE_A').value)") > 0
+    assert "LIM_PHASE_A: -5 was refused" in browser.text("#param-state")
+
+    lines = "CTL_RPM_MAX 5000\nLIM_PHASE_A -5\nNO_SUCH 1\nMOT_DIR\n"
+    browser.run(f"""{{
+        const files = new DataTransfer();
+        files.items.add(new File([{json.dumps(lines)}], "some.param"));
+        const input = document.querySelector("#param-load");
+        input.files = files.files;
+        input.dispatchEvent(new Event("change"));
+    }}""")
+    browser.wait("document.querySelector('#param-state').textContent === 'Loaded: 1 set, 0 as they were, 3 refused'")
+    told = browser.run("[...document.querySelectorAll('#param-problems li')].map((line) => line.textContent)")
+    assert told[:2] == ["line 3: there is no parameter NO_SUCH", "line 4: MOT_DIR is not NAME VALUE"]
+    assert told[2].startswith("LIM_PHASE_A: -5 was refused, out of range; give ")
     assert browser.problems == []

@@ -19,6 +19,8 @@ export class Esc extends EventTarget {
     Object.assign(this, { link, system, component, params: new Map(), count: 0, waiting: [], sequence: 0, texts: [] });
     /** As the heartbeat last told: names of the faults, and MAV_STATE. */
     Object.assign(this, { faults: [], state: 0 });
+    /** How many parameters are being set: whoever sets one tells why it was refused. */
+    this.setting = 0;
   }
 
   send(name, message) {
@@ -93,11 +95,34 @@ export class Esc extends EventTarget {
     return false;
   }
 
-  /** Sets a parameter; what is in force afterwards, or null without an answer. */
+  /** Sets a parameter; what is in force afterwards, null without an answer, and why it is not the value, or null. */
   async setParam(name, value) {
+    const begun = performance.now();
     const answer = this.next((m) => m.name === "PARAM_VALUE" && m.param_id === name);
+    this.setting++;
     this.send("PARAM_SET", { param_id: name, param_value: value, param_type: REAL32 });
-    return (await answer)?.param_value ?? null;
+    const inForce = (await answer)?.param_value ?? null;
+    let refused = null;
+    if (inForce === null) refused = "no answer";
+    else if (inForce !== Math.fround(value)) refused = (await this.reason(`${name} refused: `, begun)) || "no reason given";
+    this.setting--;
+    return { inForce, refused };
+  }
+
+  /** Sets many, in any order: what does not go with the old values may go with the others' new ones. Those that are
+   * refused in the end, as name, value and reason. */
+  async setParams(pairs) {
+    let left = pairs.filter(([name, value]) => this.params.get(name) !== Math.fround(value));
+    for (let before = Infinity; left.length && left.length < before;) {
+      before = left.length;
+      const again = [];
+      for (const [name, value] of left) {
+        const { refused } = await this.setParam(name, value);
+        if (refused !== null) again.push([name, value, refused]);
+      }
+      left = again;
+    }
+    return left;
   }
 
   /** Sends a command; `progress` hears percentages until the result, a text, is there. */

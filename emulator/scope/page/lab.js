@@ -49,15 +49,8 @@ export class Lab {
       this.told("The ESC knows nothing of this motor: identify it, or set its parameters");
       return;
     }
-    const esc = this.esc();
-    let left = params;
-    // What does not go with the old values may go with the others' new ones.
-    for (let tries = 0; left.length && tries < 2; tries++) {
-      const again = [];
-      for (const [name, value] of left) if ((await esc.setParam(name, value)) !== Math.fround(value)) again.push([name, value]);
-      left = again;
-    }
-    const refused = left.map(([name]) => name).join(", ");
+    const left = await this.esc().setParams(params);
+    const refused = left.map(([name, , reason]) => `${name} (${reason})`).join(", ");
     this.told(`The ESC knows this motor${refused && `, but refused ${refused}`}`, refused !== "");
   }
 

@@ -50,8 +50,9 @@ export class Parameters {
     const restart = about.rebootRequired ? ", in force after a restart" : "";
     const text = document.createElement("small");
     text.textContent = `${about.shortDesc} (${range}${restart})`;
-    row.append(name, value, text);
-    this.rows.set(about.name, { row, input, about });
+    const problem = Object.assign(document.createElement("em"), { className: "problem" });
+    row.append(name, value, text, problem);
+    this.rows.set(about.name, { row, input, about, problem });
     return row;
   }
 
@@ -64,6 +65,7 @@ export class Parameters {
     if (found.about.values) found.input.title = found.input.selectedOptions[0]?.textContent ?? "";
     const changed = !found.about.readOnly && Math.fround(found.about.default) !== value;
     found.row.classList.toggle("changed", changed);
+    found.problem.textContent = "";
   }
 
   filter() {
@@ -77,18 +79,29 @@ export class Parameters {
 
   async read() {
     await this.ready;
+    element("param-state").classList.remove("bad");
     element("param-state").textContent = "reading …";
     const all = await this.esc()?.readParams();
     element("param-state").textContent = all ? `${this.esc().params.size} parameters` : "not all could be read";
   }
 
   async set(name, value) {
-    const inForce = await this.esc().setParam(name, value);
-    const well = inForce !== null && Math.fround(value) === inForce;
-    this.told(well ? `${name} is ${spelt(inForce)}` : `${name}: ${spelt(value)} was refused`, !well);
-    const { input } = this.rows.get(name) ?? {};
-    if (!well && input && inForce !== null) input.value = spelt(inForce);
-    return well;
+    const { inForce, refused } = await this.esc().setParam(name, value);
+    const told = refused === null ? `${name} is ${spelt(inForce)}` : this.refusal(name, value, refused);
+    this.told(told, refused !== null);
+    element("param-state").textContent = told;
+    element("param-state").classList.toggle("bad", refused !== null);
+    const found = this.rows.get(name);
+    if (found) found.problem.textContent = refused === null ? "" : told;
+    if (refused !== null && found && inForce !== null) found.input.value = spelt(inForce);
+    return refused === null;
+  }
+
+  /** Why a value was not taken, in a line. */
+  refusal(name, value, reason) {
+    const about = this.rows.get(name)?.about;
+    const range = about && (value < about.min || value > about.max) ? `; give ${about.min} to ${about.max}` : "";
+    return `${name}: ${spelt(value)} was refused, ${reason}${range}`;
   }
 
   save() {
@@ -103,17 +116,27 @@ export class Parameters {
     const text = await input.files[0]?.text();
     input.value = "";
     if (text === undefined) return;
-    let [set, same, bad] = [0, 0, []];
-    for (const line of text.split(/\r?\n/)) {
+    const [wanted, problems] = [new Map(), []];
+    for (const [at, line] of text.split(/\r?\n/).entries()) {
       if (/^\s*(#|$)/.test(line)) continue;
       const words = line.trim().split(/[\s,]+/);
       const [name, number] = words.length >= 5 ? words.slice(2, 4) : words;
       const value = Number(number);
-      if (!this.rows.has(name) || number === undefined || !Number.isFinite(value)) bad.push(name);
-      else if (this.rows.get(name).about.readOnly || this.esc().params.get(name) === Math.fround(value)) same++;
-      else if (await this.set(name, value)) set++;
-      else bad.push(name);
+      if (number === undefined || !Number.isFinite(value)) problems.push(`line ${at + 1}: ${line.trim()} is not NAME VALUE`);
+      else if (!this.rows.has(name)) problems.push(`line ${at + 1}: there is no parameter ${name}`);
+      else wanted.set(name, value);
     }
-    this.told(`Loaded: ${set} set, ${same} as they were${bad.length ? `, refused: ${bad.join(", ")}` : ""}`, bad.length > 0);
+    const is = ([name, value]) => this.rows.get(name).about.readOnly || this.esc().params.get(name) === Math.fround(value);
+    const pairs = [...wanted].filter((pair) => !is(pair));
+    const same = wanted.size - pairs.length;
+    const refused = await this.esc().setParams(pairs);
+    problems.push(...refused.map((one) => this.refusal(...one)));
+    for (const problem of problems) this.told(problem, true);
+    const bad = problems.length ? `, ${problems.length} refused` : "";
+    const told = `Loaded: ${pairs.length - refused.length} set, ${same} as they were${bad}`;
+    this.told(told, problems.length > 0);
+    element("param-state").textContent = told;
+    element("param-state").classList.toggle("bad", problems.length > 0);
+    element("param-problems").replaceChildren(...problems.map((problem) => Object.assign(document.createElement("li"), { textContent: problem })));
   }
 }

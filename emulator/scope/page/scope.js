@@ -98,8 +98,9 @@ const link = new Link(handlers);
 const plots = new Plots(element("plots"), element("plot-choice"), (from, to) => traces.look(from, to));
 const texts = new Texts(({ component, text, severity }) => {
   const of = escs.size > 1 && escs.has(component) ? `ESC ${components().indexOf(component) + 1}: ` : "";
-  told(of + text, severity <= WARNING);
-  escs.get(component)?.said(text);
+  const esc = escs.get(component);
+  if (!(esc?.setting && text.includes(" refused: "))) told(of + text, severity <= WARNING);
+  esc?.said(text);
 });
 const remote = new Remote(link);
 const samples = new Samples();
