@@ -35,6 +35,8 @@ use pace::Pacer;
 pub struct Session {
     /// The bench.
     pub bench: Bench,
+    /// The names of its motor and load.
+    pub names: [String; 2],
     /// MAVLink endpoints.
     pub mavlink: Vec<Endpoint>,
     /// The throttle wire.
@@ -211,7 +213,9 @@ pub fn run<M: Machine>(
     warn: impl Fn(&str),
 ) -> Result<(Report, M), LiveError> {
     let pace = session.pace;
-    let (mut web, no_page) = Web::open(&session.web, session.flash.len(), &session.recordings())?;
+    let escs = session.flash.len();
+    let stands = (&session.names, escs);
+    let (mut web, no_page) = Web::open(&session.web, stands, &session.recordings())?;
     let (mut open, starts) = session.open()?;
     open.about.page = web.as_ref().map(Web::place);
     let (mut machine, warnings) = start(starts)?;

@@ -201,6 +201,7 @@ impl RunArgs {
         params.extend(self.common.params());
         let session = Session {
             bench: standing.bench.clone(),
+            names: standing.names.clone(),
             mavlink: if self.mavlink.is_empty() {
                 Endpoint::defaults()
             } else {

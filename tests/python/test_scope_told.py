@@ -37,6 +37,36 @@ def test_a_refused_test_says_so_and_why_in_place_of_the_last_one_s_lines(browser
     assert browser.problems == []
 
 
+def fit(browser, bench):
+    """Puts a bench of the library there, and waits until the ESC has been told."""
+    browser.run("document.querySelector('#events').replaceChildren()")
+    browser.run(f"document.querySelector('#bench').value = '{bench}'")
+    browser.click("#fit")
+    browser.wait(f"{EVENTS}.includes('The ESC knows this motor')")
+
+
+def test_another_bench_leaves_nothing_of_the_one_before_and_is_named(browser, esc, port):
+    look(browser, port)
+    browser.wait("document.querySelector('#param-state').textContent.includes('parameters')")
+    browser.wait("document.querySelector('#stands').textContent === 'Runs antigravity-4006-kv380 with cfprop-13x4.4'")
+    # The board tests itself, and plays its tune.
+    esc.next("HEARTBEAT", lambda m: m.system_status == 3)
+    before = dict(esc.params())
+    fit(browser, "scooter")
+    assert browser.text("#stands") == "Runs scooter-hub with rider-90kg"
+    assert "LIM_PHASE_A (its trip is beyond the current sensors' range)" in browser.text("#events")
+    assert esc.read_param("CTL_OBSERVER").param_value == 2
+    # Nothing that another page has to guess.
+    browser.open(f"http://127.0.0.1:{port}/")
+    browser.wait("/^Runs (?!antigravity)/.test(document.querySelector('#stands').textContent)")
+    browser.wait("document.querySelector('#param-state').textContent.includes('parameters')")
+    fit(browser, "bosso")
+    assert "refused" not in browser.text("#events")
+    after = dict(esc.params())
+    assert {name: value for name, value in after.items() if value != before[name]} == {}
+    assert browser.problems == []
+
+
 def test_a_refused_parameter_is_named_with_the_reason(browser, esc, port):
     look(browser, port)
     browser.wait("document.querySelector('#param-state').textContent.includes('parameters')")

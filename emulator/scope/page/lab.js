@@ -18,6 +18,9 @@ const FAULTS = {
   jitter: ["jitter on the wire", false, false, "ns rms", 100], reset: ["chip reset"], flash_fail: ["flash refuses"],
 };
 
+/** What is known of a motor's winding. */
+const OF_MOTOR = ["MOT_FLUX_MWB", "MOT_L_UH", "MOT_R_MOHM"];
+
 export class Lab {
   /** `esc` gives the ESC, `letGo` has the throttle let go, and `told` hears a line for the log. */
   constructor(link, esc, letGo, told) {
@@ -42,6 +45,11 @@ export class Lab {
     element("bench").replaceChildren(...names.map((name) => new Option(name, name)));
   }
 
+  /** This motor and load stand there. */
+  stands({ esc, names: [motor, load] }) {
+    if (esc === this.link.esc) element("stands").textContent = `Runs ${motor} with ${load}`;
+  }
+
   /** Another motor stands there, and the ESC would have to know this of it. */
   async fitted({ names: [motor, load], params }) {
     this.told(`Laboratory: ${motor} with ${load}`);
@@ -49,7 +57,10 @@ export class Lab {
       this.told("The ESC knows nothing of this motor: identify it, or set its parameters");
       return;
     }
-    const left = await this.esc().setParams(params);
+    const esc = this.esc();
+    // A motor that is not known binds no other value.
+    await esc.setParams(params.filter(([name]) => OF_MOTOR.includes(name)).map(([name]) => [name, 0]));
+    const left = await esc.setParams(params);
     const refused = left.map(([name, , reason]) => `${name} (${reason})`).join(", ");
     this.told(`The ESC knows this motor${refused && `, but refused ${refused}`}`, refused !== "");
   }

@@ -73,6 +73,7 @@ const handlers = {
     plots.offer(content.simulated ? SIMULATED : LINKED);
     traces.from(content.simulated ? remote : samples, !content.simulated);
     lab.benches(content.benches ?? []);
+    if (content.simulated) link.ask({ standing: { esc: link.esc } });
     throttle.several(content.escs);
     records.recorded(content.recordings ?? [], link.esc);
     offer();
@@ -83,6 +84,7 @@ const handlers = {
   },
   trace: (buffer) => remote.take(buffer),
   fitted: (content) => lab.fitted(content),
+  stands: (content) => lab.stands(content),
   scenario: () => lab.over(),
   switching: (seen) => switches.take(seen),
   mavlink(message) {
@@ -173,6 +175,7 @@ function choose(i) {
   letGo();
   link.esc = i;
   offer();
+  if (hello.simulated) link.ask({ standing: { esc: i } });
   samples.clear();
   traces.live();
   parameters.read();

@@ -64,6 +64,14 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     FILES.iter().map(|(name, _)| *name)
 }
 
+/// Returns true if one of the built-in benches sets this parameter.
+pub fn sets(name: &str) -> bool {
+    let params = TABLES.iter().filter_map(|table| table.get("params"));
+    params
+        .filter_map(Value::as_table)
+        .any(|params| params.contains_key(name))
+}
+
 /// Says what is wrong with a bench file on its own, from its text and its tables.
 pub type Check<'a> = &'a dyn Fn(&str, &Table) -> Result<(), String>;
 

@@ -20,6 +20,8 @@ pub(super) enum FromPage {
     Silence { esc: usize },
     /// A PWM period edge by edge.
     Switching { esc: usize },
+    /// The names of the motor and load that stand there.
+    Standing { esc: usize },
     /// Another motor with its load and supply: a bench of the library.
     Fit { esc: usize, bench: String },
     /// A scenario's throttle and faults, as text. Throttle or silence from this page ends it.

@@ -26,6 +26,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use siskin_control::drive::Phase;
+use siskin_control::params::ParamId;
 use siskin_scope::{ORDERS, Order, Site, ViewerId, What};
 
 use crate::bench::library;
@@ -45,6 +46,8 @@ pub struct Web {
     site: Site<Rings>,
     links: BTreeMap<ViewerId, LinkId>,
     taps: Taps,
+    /// One per ESC: the names of its motor and load.
+    names: Vec<[String; 2]>,
     /// One per ESC.
     throttles: Vec<Throttle>,
     /// One per ESC: what is played on it.
@@ -52,27 +55,31 @@ pub struct Web {
 }
 
 impl Web {
-    /// Serves the page of this many ESCs if wanted, with each one's recording, if any; returns a line for the user if
-    /// the usual port is taken.
+    /// Serves the page of this many ESCs if wanted, which have a motor and a load of these names, with each one's
+    /// recording, if any; returns a line for the user if the usual port is taken.
     ///
     /// # Errors
     /// It cannot be served where the user wants it.
     pub fn open(
         address: &WebAddress,
-        escs: usize,
+        stands: (&[String; 2], usize),
         recordings: &[PathBuf],
     ) -> Result<(Option<Self>, Option<String>), WebError> {
         match address {
             WebAddress::None => Ok((None, None)),
-            WebAddress::At(address) => Ok((Some(Self::listen(address, escs, recordings)?), None)),
-            WebAddress::Usual => match Self::listen(&WebAddress::usual(), escs, recordings) {
+            WebAddress::At(address) => Ok((Some(Self::listen(address, stands, recordings)?), None)),
+            WebAddress::Usual => match Self::listen(&WebAddress::usual(), stands, recordings) {
                 Ok(web) => Ok((Some(web), None)),
                 Err(error) => Ok((None, Some(format!("no page: {error}")))),
             },
         }
     }
 
-    fn listen(address: &HostPort, escs: usize, recordings: &[PathBuf]) -> Result<Self, WebError> {
+    fn listen(
+        address: &HostPort,
+        (names, escs): (&[String; 2], usize),
+        recordings: &[PathBuf],
+    ) -> Result<Self, WebError> {
         let rings = Arc::new(Rings::new(escs));
         Ok(Self {
             taps: Taps::new(&rings, escs),
@@ -83,6 +90,7 @@ impl Web {
                 recordings.to_vec(),
             )?,
             links: BTreeMap::new(),
+            names: vec![names.clone(); escs],
             throttles: (0..escs).map(|_| Throttle::default()).collect(),
             playing: (0..escs).map(|_| None).collect(),
         })
@@ -171,6 +179,7 @@ impl Web {
         let (FromPage::Throttle { esc, .. }
         | FromPage::Silence { esc }
         | FromPage::Switching { esc }
+        | FromPage::Standing { esc }
         | FromPage::Fit { esc, .. }
         | FromPage::Scenario { esc, .. }
         | FromPage::Fault { esc, .. }
@@ -191,9 +200,18 @@ impl Web {
                 self.release(esc, from);
                 Ok(())
             }
+            FromPage::Standing { .. } => {
+                self.site
+                    .tell(Some(from.0), &standing(esc, &self.names[esc]));
+                Ok(())
+            }
             FromPage::Fit { bench, .. } => {
-                let told = fit(esc, &bench, machine)?;
-                self.site.tell(Some(from.0), &told);
+                let (names, params) = fit(esc, &bench, machine)?;
+                self.site.tell(None, &standing(esc, &names));
+                let fitted = serde_json::json!({ "names": names, "params": params });
+                let told = serde_json::json!({ "fitted": fitted });
+                self.site.tell(Some(from.0), &told.to_string());
+                self.names[esc] = names;
                 Ok(())
             }
             FromPage::Scenario { text, .. } => {
@@ -229,20 +247,34 @@ impl Web {
     }
 }
 
-/// Fits a bench of the library; returns what the page is told of it, including what the ESC would have to know.
-fn fit(esc: usize, bench: &str, machine: &mut impl Machine) -> Result<String, String> {
+/// Parameters by name.
+type Named = Vec<(&'static str, f32)>;
+
+/// Fits a bench of the library; returns the names of its motor and load, and what the ESC would have to know: whatever
+/// any of these benches sets, from the factory if this one does not, so that nothing of another is left.
+fn fit(
+    esc: usize,
+    bench: &str,
+    machine: &mut impl Machine,
+) -> Result<([String; 2], Named), String> {
     if !library::names().any(|known| known == bench) {
         // A page has no right to this machine's files.
         return Err("there is no such bench in the library".to_owned());
     }
     let standing = scenario::stand(bench, toml::Table::new()).map_err(|error| error.to_string())?;
     machine.fit(esc, &standing.bench)?;
-    let params = standing.params.iter();
-    let params: Vec<_> = params
-        .map(|(id, value)| (id.entry().name, *value))
-        .collect();
-    let fitted = serde_json::json!({ "names": standing.names, "params": params });
-    Ok(serde_json::json!({ "fitted": fitted }).to_string())
+    let entries = ParamId::ALL.iter().map(|id| (*id, id.entry()));
+    let params = entries.filter(|(_, entry)| library::sets(entry.name));
+    let params = params.map(|(id, entry)| {
+        let own = standing.params.iter().find(|(of, _)| *of == id);
+        (entry.name, own.map_or(entry.default, |(_, value)| *value))
+    });
+    Ok((standing.names, params.collect()))
+}
+
+/// Returns what a page is told of the motor and load that stand there.
+fn standing(esc: usize, names: &[String; 2]) -> String {
+    serde_json::json!({ "stands": { "esc": esc, "names": names } }).to_string()
 }
 
 /// Returns a page's greeting: what is available.

@@ -17,10 +17,14 @@ struct Desk {
     rpm: f64,
 }
 
+fn names() -> [String; 2] {
+    ["a motor", "a load"].map(str::to_owned)
+}
+
 impl Desk {
     fn new() -> Self {
         let address = "127.0.0.1:0".parse().unwrap();
-        let (web, line) = Web::open(&address, 1, &[]).unwrap();
+        let (web, line) = Web::open(&address, (&names(), 1), &[]).unwrap();
         assert_eq!(line, None);
         Self {
             web: web.unwrap(),
@@ -234,10 +238,13 @@ fn who_does_not_read_is_dropped_and_costs_the_others_nothing() {
 fn a_taken_port_is_an_error_only_where_it_was_named() {
     let desk = Desk::new();
     let taken = WebAddress::At(desk.web.place().0.into());
-    let line = Web::open(&taken, 1, &[]).err().unwrap().to_string();
+    let line = Web::open(&taken, (&names(), 1), &[])
+        .err()
+        .unwrap()
+        .to_string();
     assert!(line.contains("is taken; give another port"), "{line}");
     assert!(matches!(
-        Web::open(&WebAddress::None, 1, &[]),
+        Web::open(&WebAddress::None, (&names(), 1), &[]),
         Ok((None, None))
     ));
 }
