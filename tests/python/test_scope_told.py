@@ -94,3 +94,26 @@ def test_a_refused_parameter_is_named_with_the_reason(browser, esc, port):
     assert told[:2] == ["line 3: there is no parameter NO_SUCH", "line 4: MOT_DIR is not NAME VALUE"]
     assert told[2].startswith("LIM_PHASE_A: -5 was refused, out of range; give ")
     assert browser.problems == []
+
+
+def test_with_a_fault_nothing_looks_well_and_no_faded_estimate_is_a_speed(browser, esc, port):
+    look(browser, port)
+    spin(browser, esc)
+    assert browser.text("#drive") == "run, armed"
+    inject(browser, "mosfet_short")
+    browser.wait("document.querySelector('#drive').textContent === 'idle, armed, fault'")
+    assert browser.run("document.querySelector('#drive').classList.contains('bad')")
+    assert not browser.run("document.querySelector('#drive').classList.contains('good')")
+    # The shorted winding brakes the shaft within a fifth of a second, the estimate fades for seconds.
+    esc.next("ESC_STATUS", lambda m: m.rpm[0] < 1500)
+    assert esc.status().rpm[0] > 300
+    assert browser.text("#tile-rpm + span") == "True speed, rpm"
+    assert abs(int(browser.text("#tile-rpm"))) < 150
+    # A piece of the past does not tell what holds now.
+    browser.click("#pause")
+    browser.wait("document.querySelector('#tile-rpm + span').textContent === 'Speed, bridge off'")
+    browser.click("#mend")
+    browser.click("#stop")
+    browser.wait("document.querySelector('#tile-faults').textContent === 'none'")
+    browser.wait("document.querySelector('#drive').textContent === 'at rest'")
+    assert browser.problems == []

@@ -35,8 +35,9 @@ export class Fleet {
     if (part && part.textContent !== text) part.textContent = text;
   }
 
-  status(i, { rpm, current }, slot) {
-    this.tell(i, "rpm", `${rpm[slot]} rpm`);
+  /** With a fault the bridge is off, and the speed is no more than a guess. */
+  status(i, { rpm, current }, slot, isFaulty) {
+    this.tell(i, "rpm", `${isFaulty ? "–" : rpm[slot]} rpm`);
     this.tell(i, "amps", `${digits(current[slot])} A`);
   }
 

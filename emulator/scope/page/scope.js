@@ -153,7 +153,7 @@ function telemetry(message) {
     const isOf = message.index === SLOTS * Math.floor(number / SLOTS) && (sender === esc || !esc.tells);
     if (!isOf) continue;
     const slot = number % SLOTS;
-    if (message.name === "ESC_STATUS") fleet.status(i, message, slot);
+    if (message.name === "ESC_STATUS") fleet.status(i, message, slot, esc.faults.length > 0);
     if (esc !== current()) continue;
     if (message.name === "ESC_STATUS") {
       tiles.status(message, slot);
@@ -202,7 +202,7 @@ function heartbeat(message) {
   if (esc !== current()) return;
   tiles.conditions(faults, named(message.custom_mode, hello.limits));
   samples.last("faults", message.custom_mode & 0xffff);
-  if (!hello.simulated) drive(STATES[system_status] ?? "starting");
+  if (!hello.simulated || !traces.isLatest) drive(STATES[system_status] ?? "starting");
 }
 
 function shown(name) {
@@ -215,11 +215,12 @@ function named(bits, names) {
   return Object.entries(names).filter(([bit]) => bits & (1 << bit)).map(([, name]) => name);
 }
 
-/** The drive's state, and whether its throttle is open. */
+/** The drive's state, whether its throttle is open, and whether a fault holds. */
 function drive(state) {
-  const isArmed = current()?.isArmed;
-  element("drive").textContent = isArmed ? `${state}, armed` : state;
-  element("drive").className = `badge ${isArmed ? "good" : ""}`;
+  const { isArmed, faults = [] } = current() ?? {};
+  const isFaulty = faults.length > 0;
+  element("drive").textContent = [state, isArmed && "armed", isFaulty && "fault"].filter(Boolean).join(", ");
+  element("drive").className = `badge ${isFaulty ? "bad" : isArmed ? "good" : ""}`;
 }
 
 element("stream").addEventListener("click", async () => {
@@ -234,11 +235,11 @@ function seen({ values }) {
   element("plane").hidden = !hello.simulated && i_d == null;
   drawPhasor({ i_d, i_q, u_d, u_q });
   const faults = last("faults");
-  const names = faults == null ? null : named(faults, hello.faults);
-  // The traces tell it sooner than the heartbeat.
+  // The latest traces tell it sooner than the heartbeat; a piece of the past does not tell it.
+  const names = faults == null || !traces.isLatest ? null : named(faults, hello.faults);
   if (names && current()) current().faults = names;
-  tiles.traces({ values }, names);
-  if (hello.simulated) drive(hello.phases[last("phase")] ?? "");
+  tiles.traces({ values }, names, traces.isLatest);
+  if (hello.simulated && traces.isLatest) drive(hello.phases[last("phase")] ?? "");
 }
 
 function page(name) {

@@ -31,7 +31,8 @@ export class Tiles {
   }
 
   status({ rpm, voltage, current }, slot) {
-    this.set("rpm", String(rpm[slot]));
+    this.estimate = String(rpm[slot]);
+    this.showSpeed();
     this.set("volts", digits(voltage[slot], 2));
     this.set("amps", digits(current[slot], 2));
     this.set("watts", digits(voltage[slot] * current[slot], 1));
@@ -48,9 +49,11 @@ export class Tiles {
     this.showFaults();
   }
 
-  /** What the traces tell: the faults as they come, and power into the shaft against that from the supply. */
-  traces({ values }, faults) {
+  /** What the traces tell: the faults as they come, the true speed where `isLatest`, and power into the shaft against
+   * that from the supply. */
+  traces({ values }, faults, isLatest) {
     this.known = faults;
+    this.truth = this.isSimulated && isLatest ? values.rpm?.at(-1) : null;
     this.showFaults();
     const mean = (list) => list.reduce((sum, value) => sum + value, 0) / list.length;
     if (!values.torque_nm) return;
@@ -62,11 +65,26 @@ export class Tiles {
 
   /** Whether there are traces that tell the power into the shaft. */
   simulated(isSimulated) {
+    this.isSimulated = isSimulated;
     this.tiles.efficiency.parentElement.hidden = !isSimulated;
   }
 
+  get faults() {
+    return this.known ?? this.told ?? [];
+  }
+
+  /** The estimate, but with a fault: then the bridge is off, and the estimate only fades. */
+  showSpeed() {
+    const isFaulty = this.faults.length > 0;
+    this.set("rpm", isFaulty ? (this.truth?.toFixed(0).replace(/^-0$/, "0") ?? "–") : (this.estimate ?? "–"));
+    const label = !isFaulty ? "Speed, rpm" : this.truth == null ? "Speed, bridge off" : "True speed, rpm";
+    const { nextSibling } = this.tiles.rpm;
+    if (nextSibling.textContent !== label) nextSibling.textContent = label;
+  }
+
   showFaults() {
-    const faults = this.known ?? this.told ?? [];
+    const { faults } = this;
+    this.showSpeed();
     this.set("faults", faults.length ? faults.join(", ") : "none");
     this.tiles.faults.parentElement.classList.toggle("bad", faults.length > 0);
   }

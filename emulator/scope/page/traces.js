@@ -14,6 +14,8 @@ export class Traces {
   /** `seen` hears each piece that is drawn. */
   constructor(link, plots, seen) {
     Object.assign(this, { link, plots, seen, source: null, spans: [], id: 0, span: 1, to: null, paused: false });
+    /** Whether what is shown ends now. */
+    this.isLatest = false;
     this.after = 0;
     this.latest = 0;
     element("span").addEventListener("change", () => this.zoom(Number(element("span").value)));
@@ -142,6 +144,7 @@ export class Traces {
     const to = crossing === null ? (this.paused ? this.to : t.at(-1)) : crossing + (1 - BEFORE) * this.span;
     const data = { t, values, from: to - this.span, to };
     // The figures need not wait for the plots.
+    this.isLatest = !this.paused && crossing === null;
     this.seen(data);
     await this.plots.draw(data);
     if (crossing !== null && (kind === "fault" || kind === "start")) {
