@@ -2,7 +2,9 @@
 
 import http.client
 import json
+import os
 import re
+import signal
 import subprocess
 import time
 
@@ -212,3 +214,21 @@ def test_bad_addresses_are_one_line(served):
         ended = subprocess.run([str(TOOL), "scope", *connect, *arguments], capture_output=True, text=True, timeout=60)
         assert (ended.returncode, ended.stderr.count("\n")) == (2, 1), ended.stderr
         assert told in ended.stderr
+
+
+def test_an_esc_that_falls_silent_does_not_look_live(browser, served):
+    esc, url = served
+    look(browser, url)
+    process = esc.emulator.process
+    os.kill(process.pid, signal.SIGSTOP)
+    try:
+        browser.wait("document.querySelector('#state').textContent === 'ESC silent'")
+        assert browser.text("#tile-rpm") == "–"
+        assert browser.run("document.querySelector('#turn').matches(':disabled')")
+        assert browser.run("document.querySelector('#stream').matches(':disabled')")
+    finally:
+        os.kill(process.pid, signal.SIGCONT)
+    browser.wait("document.querySelector('#state').textContent === 'connected'")
+    assert browser.run("document.querySelector('#turn').matches(':enabled')")
+    browser.wait("/^-?\\d+$/.test(document.querySelector('#tile-rpm').textContent)")
+    assert browser.problems == []

@@ -117,3 +117,46 @@ def test_with_a_fault_nothing_looks_well_and_no_faded_estimate_is_a_speed(browse
     browser.wait("document.querySelector('#tile-faults').textContent === 'none'")
     browser.wait("document.querySelector('#drive').textContent === 'at rest'")
     assert browser.problems == []
+
+
+def test_without_the_program_nothing_looks_live_and_nothing_can_be_pressed(browser, esc, port):
+    look(browser, port)
+    spin(browser, esc)
+    esc.emulator.kill()
+    browser.wait("document.querySelector('#state').textContent === 'not connected'")
+    tiles = "[...document.querySelectorAll('#tiles b')].map((tile) => tile.textContent)"
+    assert set(browser.run(tiles)) == {"–"}
+    assert browser.text("#drive") == ""
+    assert float(browser.run("getComputedStyle(document.querySelector('#plots')).opacity")) < 0.5
+    can = "[...document.querySelectorAll('button, input, select')].filter((one) => one.matches(':enabled'))"
+    left = browser.run(f"{can}.map((one) => one.id).filter((id) => id)")
+    # What was seen can still be looked at, and saved.
+    assert set(left) == {
+        "show-scope", "show-parameters", "theme", "pause", "live", "span", "zoom-in", "zoom-out", "trigger",
+        "trigger-channel", "trigger-value", "trigger-edge", "export-svg", "export-png", "export-csv",
+    }  # fmt: skip
+    # It looks for its program, in vain.
+    assert all("WebSocket" in problem for problem in browser.problems)
+    browser.problems.clear()
+
+
+def test_faults_are_read_out_and_stop_is_in_reach_on_a_phone(browser, esc, port):
+    look(browser, port)
+    live = "document.querySelector('#tile-faults').closest('[aria-live]')?.getAttribute('aria-live')"
+    assert browser.run(live) == "assertive"
+    try:
+        browser.show(390, 700, dark=False)
+        spin(browser, esc)
+        browser.run("window.scrollTo(0, document.body.scrollHeight)")
+        where = "(({top, bottom}) => [top, bottom, innerHeight])(document.querySelector('#stop-always').getBoundingClientRect())"
+        top, bottom, height = browser.run(where)
+        assert 0 < top < bottom <= height
+        browser.click("#stop-always")
+        esc.wait_rpm(-100, 1000)
+        assert browser.text("#arm") == "Arm"
+        browser.click("#show-parameters")
+        assert browser.run("document.querySelector('#stop-always').checkVisibility()")
+    finally:
+        browser.show(1280, 900, dark=False)
+    assert not browser.run("document.querySelector('#stop-always').checkVisibility()")
+    assert browser.problems == []

@@ -41,6 +41,14 @@ export class Fleet {
     this.tell(i, "amps", `${digits(current[slot])} A`);
   }
 
+  /** Nothing is known any more. */
+  unknown() {
+    for (const i of this.buttons.keys()) {
+      for (const name of ["rpm", "amps"]) this.tell(i, name, "–");
+      this.faults(i, []);
+    }
+  }
+
   faults(i, names) {
     this.tell(i, "faults", names.join(", "));
     this.buttons[i]?.classList.toggle("bad", names.length > 0);

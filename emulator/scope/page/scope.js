@@ -37,6 +37,9 @@ const element = (id) => document.getElementById(id);
 const escs = new Map();
 let hello = null;
 
+/** Three heartbeats. */
+const SILENT_MS = 3500;
+
 /** A line of the log. */
 function told(text, bad = false) {
   // Once is enough.
@@ -61,8 +64,9 @@ const handlers = {
   open: () => state("connected", "good"),
   close() {
     state("not connected", "bad");
-    escs.clear();
     letGo();
+    escs.clear();
+    known(false);
   },
   hello(content) {
     hello = content;
@@ -77,6 +81,7 @@ const handlers = {
     throttle.several(content.escs);
     records.recorded(content.recordings ?? [], link.esc);
     offer();
+    known(true);
   },
   refused(reason) {
     told(`Refused: ${reason}`, true);
@@ -126,6 +131,30 @@ function current() {
   if (escs.size < (hello?.escs ?? 1)) return undefined;
   return escs.get(components()[link.esc]);
 }
+
+/** Whether what is shown is so now, and whether anyone hears what is asked. */
+function known(isKnown) {
+  document.body.classList.toggle("gone", !isKnown);
+  for (const controls of document.querySelectorAll("fieldset.controls")) controls.disabled = !isKnown;
+  element("stop-always").disabled = !isKnown;
+  if (isKnown) return;
+  tiles.unknown();
+  fleet.unknown();
+  element("drive").textContent = "";
+  element("drive").className = "badge";
+}
+
+/** An ESC on a link may fall silent while the program that serves the page goes on. */
+function listen() {
+  const esc = current();
+  if (!link.isOpen || !esc || hello.simulated) return;
+  const isSilent = performance.now() - esc.heard > SILENT_MS;
+  if (isSilent === document.body.classList.contains("gone")) return;
+  if (isSilent) letGo();
+  state(isSilent ? "ESC silent" : "connected", isSilent ? "bad" : "good");
+  known(!isSilent);
+}
+setInterval(listen, SILENT_MS / 10);
 
 function letGo() {
   for (const handle of handles) handle.refused();
@@ -193,6 +222,7 @@ function heartbeat(message) {
     if (current() && current() !== before) parameters.read();
   }
   const esc = escs.get(component);
+  esc.heard = performance.now();
   esc.isArmed = Boolean(base_mode & ARMED);
   esc.state = system_status;
   if (!hello) return;
@@ -249,6 +279,7 @@ function page(name) {
   }
   if (name === "parameters") letGo();
 }
+element("stop-always").addEventListener("click", () => element(hello?.simulated ? "stop" : "halt").click());
 element("show-scope").addEventListener("click", () => page("scope"));
 element("show-parameters").addEventListener("click", () => page("parameters"));
 

@@ -5,6 +5,7 @@ const NAMES = [
   ["celsius", "Board, °C"], ["efficiency", "Efficiency, %"], ["faults", "Faults"], ["limits", "Limits"],
 ];
 const WIDE = ["faults", "limits"];
+const LIVE = { faults: "assertive", limits: "polite" };
 const LEAST_W = 1;
 const NO_TEMPERATURE = 32767;
 
@@ -21,9 +22,19 @@ export class Tiles {
       value.id = `tile-${name}`;
       [value.textContent, text.textContent] = ["–", label];
       tile.append(value, text);
+      // Read out as they come, faults at once.
+      if (LIVE[name]) tile.setAttribute("aria-live", LIVE[name]);
+      if (LIVE[name]) tile.setAttribute("aria-atomic", "true");
       place.append(tile);
       this.tiles[name] = value;
     }
+  }
+
+  /** Nothing is known any more. */
+  unknown() {
+    for (const name of Object.keys(this.tiles)) this.set(name, "–");
+    this.tiles.faults.parentElement.classList.remove("bad");
+    Object.assign(this, { estimate: null, truth: null, told: null, known: null });
   }
 
   set(name, text) {
