@@ -1,9 +1,11 @@
 """What the page tells a person: why something was refused, what state the ESC is in, what is known no more."""
 
 import json
+from xml.etree import ElementTree
 
 from scope import browser, esc, look, port, spin  # noqa: F401  (fixtures)
 
+SVG = "{http://www.w3.org/2000/svg}"
 EVENTS = "document.querySelector('#events').textContent"
 
 
@@ -159,4 +161,25 @@ def test_faults_are_read_out_and_stop_is_in_reach_on_a_phone(browser, esc, port)
     finally:
         browser.show(1280, 900, dark=False)
     assert not browser.run("document.querySelector('#stop-always').checkVisibility()")
+    assert browser.problems == []
+
+
+def test_a_flat_signal_has_an_axis_in_its_unit(browser, esc, port):
+    look(browser, port)
+    browser.run("""
+        window.files = [];
+        const create = URL.createObjectURL;
+        URL.createObjectURL = (blob) => { window.files.push(blob); return create(blob); };
+    """)
+    # At rest, with the brake, nothing flows.
+    esc.next("HEARTBEAT", lambda m: m.system_status == 3)
+    browser.run("new Promise((resolve) => setTimeout(resolve, 2500))")
+    browser.click("#export-svg")
+    browser.wait("window.files.length > 0")
+    texts = [text.text for text in ElementTree.fromstring(browser.run("window.files[0].text()")).iter(SVG + "text")]
+    least = {"Speed, rpm": 10, "Phase currents, A": 0.5, "Currents d, q, A": 0.5, "Throttle": 0.1}
+    for name, span in least.items():
+        # Its name is followed by the ends and the middle of its axis.
+        low, _, high = map(float, texts[texts.index(name) + 1 :][:3])
+        assert span <= high - low < 2 * span, name
     assert browser.problems == []

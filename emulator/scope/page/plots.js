@@ -31,6 +31,9 @@ export const LINKED = [
   ["Temperature", "°C", [["celsius", "board"]], false],
 ];
 
+/** The least height of an axis by its unit: less is noise, which would fill the plot. */
+const LEAST = { rpm: 10, A: 0.5, "°": 1, "": 0.1, V: 0.5, Wb: 1e-4, Nm: 0.01, "°C": 1 };
+
 const colours = new Map();
 
 /** A colour of the style sheet as the canvas takes it, of the scheme in force. */
@@ -109,7 +112,7 @@ export class Plots {
       height: HEIGHT,
       legend: { live: true },
       cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false }, points: { size: 5 } },
-      scales: { x: { time: false }, y: { range: (_, min, max) => room(min, max) } },
+      scales: { x: { time: false }, y: { range: (_, min, max) => room(min, max, unit) } },
       axes: [{ ...axis, size: 28, values: (_, at) => at.map((t) => `${+t.toFixed(5)}`) }, { ...axis, size: AXIS, space: 18, values: (_, at) => at.map((value) => `${+value.toPrecision(4)}`) }],
       series: [
         { label: "t, s", value: (_, t) => (t == null ? "–" : t.toFixed(5)) },
@@ -171,11 +174,10 @@ export class Plots {
   }
 }
 
-/** The range of the vertical axis: with some room, and never less than what noise is. */
-function room(min, max) {
+/** The range of a unit's vertical axis: with some room, and no less than the least height. */
+export function room(min, max, unit) {
   if (min == null) return [0, 1];
-  if (min === 0 && max === 0) return [-1, 1];
-  const least = Math.max(Math.abs(min), Math.abs(max)) * 0.02 + 1e-6;
-  const spare = Math.max((max - min) * 0.08, least);
-  return [min - spare, max + spare];
+  const half = 0.58 * Math.max(max - min, LEAST[unit]);
+  const middle = (min + max) / 2;
+  return [middle - half, middle + half];
 }

@@ -1,6 +1,6 @@
 // The six switches of one period of the PWM, with the voltages and the currents that they make.
 
-import { colour } from "./plots.js";
+import { colour, room } from "./plots.js";
 
 const EVERY_MS = 250;
 const HEIGHT = { gates: 150, others: 130 };
@@ -79,7 +79,7 @@ export class Switches {
       title: unit ? `${name}, ${unit}` : name, width: this.width, height,
       cursor: { sync: { key: "switches" }, drag: { x: true, y: false }, points: { show: false } },
       legend: { show: options.hasLegend },
-      scales: { x: { time: false }, y: options.scale ?? {} },
+      scales: { x: { time: false }, y: options.scale ?? { range: (_, min, max) => room(min, max, unit) } },
       axes: [{ ...axis, size: 28 }, { ...axis, size: AXIS, space: 18, ...options.axis }],
       series: [
         { label: "t, µs", value: (_, t) => (t == null ? "–" : t.toFixed(3)) },
