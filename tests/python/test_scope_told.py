@@ -183,3 +183,32 @@ def test_a_flat_signal_has_an_axis_in_its_unit(browser, esc, port):
         low, _, high = map(float, texts[texts.index(name) + 1 :][:3])
         assert span <= high - low < 2 * span, name
     assert browser.problems == []
+
+
+def test_bounds_are_a_pale_area_with_edges_and_read_as_bounds(browser, esc, port):
+    look(browser, port)
+    at = spin(browser, esc)
+    # Two seconds at a steady speed, of which a column has some sixty periods.
+    browser.run("new Promise((resolve) => setTimeout(resolve, 2500))")
+    browser.click("#pause")
+    browser.mouse("mouseReleased", *at)
+    browser.run("""
+        window.files = [];
+        const create = URL.createObjectURL;
+        URL.createObjectURL = (blob) => { window.files.push(blob); return create(blob); };
+    """)
+    # The middle of the phase currents' plot, where a line through the bounds is opaque.
+    canvas = "document.querySelectorAll('#plots canvas')[1]"
+    middle = f"{canvas}.getContext('2d').getImageData({canvas}.width * 0.6, {canvas}.height / 2 - 12, 60, 1).data"
+    opaque = f"[...{middle}].filter((value, i) => i % 4 === 3 && value === 255).length"
+    assert browser.run(opaque) < 6
+    browser.click("#export-svg")
+    browser.wait("window.files.length > 0")
+    paths = list(ElementTree.fromstring(browser.run("window.files[0].text()")).iter(SVG + "path"))
+    assert sum(path.get("fill-opacity") == "0.25" for path in paths) == 11
+    # The legend at the cursor.
+    box = browser.box("#plots .plot:nth-child(2) .u-over")
+    browser.mouse("mouseMoved", box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    legend = "document.querySelector('#plots .plot:nth-child(2) .u-legend').textContent"
+    browser.wait(f"/a-[23][.\\d]* … [23][.\\d]*b/.test({legend})")
+    assert browser.problems == []

@@ -1,5 +1,6 @@
 // What is on the screen as a file.
 
+import { runs } from "./envelope.js";
 import { colour } from "./plots.js";
 
 const WIDTH = 1000;
@@ -15,6 +16,17 @@ export function download(name, blob) {
 
 const escaped = (text) => text.replace(/[&<>]/g, (sign) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;" })[sign]);
 
+/** The bounds of a trace: an area with its edges. */
+function area(pieces, x, y, colour) {
+  const edge = (points) => points.map(([t, value]) => `${x(t).toFixed(1)} ${y(value).toFixed(1)}`).join("L");
+  return pieces.map((run) => {
+    const upper = run.map(([t, , greatest]) => [t, greatest]);
+    const lower = run.map(([t, least]) => [t, least]);
+    const edges = `<path d="M${edge(upper)}M${edge(lower)}" fill="none" stroke="${colour}"/>`;
+    return `<path d="M${edge([...upper, ...lower.toReversed()])}Z" fill="${colour}" fill-opacity="0.25"/>${edges}`;
+  }).join("");
+}
+
 /** The plots as one SVG. */
 export function svg({ shown, data }) {
   const [line, text, back] = ["--line", "--text", "--card"].map(colour);
@@ -24,6 +36,7 @@ export function svg({ shown, data }) {
     const y = (value) => 24 + (1 - (value - min) / (max - min)) * (HEIGHT - 40);
     const traces = channels.map((channel, i) => {
       const values = data.values[channel] ?? [];
+      if (data.bounds) return area(runs(data.t, values), x, y, colour(COLOURS[i]));
       let pen = "M";
       const path = data.t.map((t, at) => {
         if (values[at] == null || t < data.from) { pen = "M"; return ""; }

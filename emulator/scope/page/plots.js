@@ -1,5 +1,7 @@
 // The plots: one uPlot each, with a common time axis, cursor and marks.
 
+import { envelope, pale } from "./envelope.js";
+
 const HEIGHT = 128;
 const AXIS = 52;
 const COLOURS = ["--trace-0", "--trace-1", "--trace-2"];
@@ -47,6 +49,8 @@ export function colour(name) {
   }
   return colours.get(name);
 }
+
+const lines = globalThis.uPlot.paths.linear();
 
 /** Lets what else is due have its turn: whoever holds the throttle must be heard. */
 const breath = () => new Promise((resolve) => setTimeout(resolve));
@@ -117,7 +121,10 @@ export class Plots {
       series: [
         { label: "t, s", value: (_, t) => (t == null ? "–" : t.toFixed(5)) },
         ...channels.map(([, label], i) => ({
-          label, stroke: colour(COLOURS[i]), width: 1, points: { show: false }, spanGaps: this.plots === LINKED, value: (_, value) => digits(value),
+          label, stroke: colour(COLOURS[i]), width: 1, points: { show: false }, spanGaps: this.plots === LINKED,
+          fill: pale(colour(COLOURS[i])),
+          paths: (plot, series, from, to) => this.paths(plot, series, from, to),
+          value: (plot, value, series, at) => this.told(plot.data[series], value, at),
         })),
       ],
       hooks: {
@@ -128,6 +135,19 @@ export class Plots {
     };
     const plot = new globalThis.uPlot(options, [[], ...channels.map(() => [])], box);
     return { plot, channels: channels.map(([channel]) => channel), name, unit, labels: channels.map((c) => c[1]) };
+  }
+
+  /** A line where each value is known, and bounds where a column has many. */
+  paths(plot, series, from, to) {
+    if (this.data?.bounds) return envelope(plot, series);
+    return { ...lines(plot, series, from, to), fill: null };
+  }
+
+  /** A value in words, or the bounds. */
+  told(values, value, at) {
+    if (value == null || at == null || !this.data?.bounds) return digits(value);
+    const [least, greatest] = [values[at & ~1], values[at | 1]].map(digits);
+    return least === greatest ? least : `${least} … ${greatest}`;
   }
 
   select(plot) {
@@ -159,7 +179,8 @@ export class Plots {
     return [...new Set(this.shown.flatMap((shown) => shown.channels))];
   }
 
-  /** Draws a piece: times, values by the channel's name, and the range of time. */
+  /** Draws a piece: times, values by the channel's name, the range of time, and whether the values are the least and
+   * greatest of columns in turn. */
   async draw(data) {
     this.data = data;
     const { shown } = this;

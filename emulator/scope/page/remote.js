@@ -30,6 +30,6 @@ export class Remote {
     const start = 32 + 8 * points;
     const known = (value) => (Number.isNaN(value) ? null : value);
     const values = Object.fromEntries(names.map((name, i) => [name, Array.from(new Float32Array(buffer, start + 4 * i * points, points), known)]));
-    resolve({ t, values, crossing: view.getUint8(1) === 1 ? view.getFloat64(24, true) : null });
+    resolve({ t, values, bounds: view.getUint8(2) === 1, crossing: view.getUint8(1) === 1 ? view.getFloat64(24, true) : null });
   }
 }

@@ -134,15 +134,15 @@ export class Traces {
       columns: Math.round(this.plots.width), trigger: this.trigger(), hold: this.paused,
     };
     const found = await this.source.view(view, names);
-    if (found?.t.length) await this.show(found.t, found.values, found.crossing);
+    if (found?.t.length) await this.show(found);
   }
 
-  async show(t, values, crossing) {
+  async show({ t, values, crossing, bounds = false }) {
     const kind = element("trigger").value;
     if (!this.paused && crossing === null) this.latest = t.at(-1);
     this.plots.marks.T = crossing ?? (this.paused ? this.plots.marks.T : null);
     const to = crossing === null ? (this.paused ? this.to : t.at(-1)) : crossing + (1 - BEFORE) * this.span;
-    const data = { t, values, from: to - this.span, to };
+    const data = { t, values, bounds, from: to - this.span, to };
     // The figures need not wait for the plots.
     this.isLatest = !this.paused && crossing === null;
     this.seen(data);

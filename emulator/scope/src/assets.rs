@@ -31,6 +31,7 @@ static FILES: &[(&str, &str, &str)] = files! {
     "/remote.js" JS "remote.js",
     "/samples.js" JS "samples.js",
     "/plots.js" JS "plots.js",
+    "/envelope.js" JS "envelope.js",
     "/traces.js" JS "traces.js",
     "/phasor.js" JS "phasor.js",
     "/tiles.js" JS "tiles.js",

@@ -91,9 +91,10 @@ impl Places<'_> {
     }
 }
 
-/// Encodes the answer to a view: [`TRACE`], whether a trigger was found, two zero bytes, and as u32 the id, the ESC,
-/// the number of points and that of channels; then as f64 the time of the crossing, the time of each point, and as f32
-/// each channel's values. All is little-endian; unknown values are NaN.
+/// Encodes the answer to a view: [`TRACE`], whether a trigger was found, whether the values are the least and greatest
+/// of each column in turn, a zero byte, and as u32 the id, the ESC, the number of points and that of channels; then as
+/// f64 the time of the crossing, the time of each point, and as f32 each channel's values. All is little-endian; unknown
+/// values are NaN.
 pub(super) fn answer(view: &View, chunks: &[Arc<Chunk>]) -> Vec<u8> {
     let places = Places(chunks);
     let channels: Vec<_> = view
@@ -136,7 +137,7 @@ pub(super) fn answer(view: &View, chunks: &[Arc<Chunk>]) -> Vec<u8> {
         2 * parts.len()
     };
 
-    let mut bytes = vec![TRACE, u8::from(crossing.is_some()), 0, 0];
+    let mut bytes = vec![TRACE, u8::from(crossing.is_some()), u8::from(!is_exact), 0];
     for number in [
         view.id,
         view.esc as u32,
@@ -253,12 +254,16 @@ mod tests {
     #[test]
     fn a_short_piece_is_exact_and_a_long_one_keeps_its_peaks() {
         let chunks = chunks();
-        let (_, times, values) = read(&answer(&view(0.1, 400), &chunks));
+        let exact = answer(&view(0.1, 400), &chunks);
+        assert_eq!(exact[2], 0);
+        let (_, times, values) = read(&exact);
         assert_eq!((times.len(), times[0], times[100]), (101, 1.947, 2.047));
         assert_eq!(values[0][3], 1950.0);
         assert!(values[2].iter().all(|value| value.is_nan()));
 
-        let (_, times, values) = read(&answer(&view(10.0, 100), &chunks));
+        let bounds = answer(&view(10.0, 100), &chunks);
+        assert_eq!(bounds[2], 1);
+        let (_, times, values) = read(&bounds);
         assert_eq!(times.len(), 2 * 98, "21 in a column");
         assert!(times.is_sorted());
         assert_eq!(values[0][..4], [0.0, 20.0, 21.0, 41.0]);
