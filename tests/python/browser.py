@@ -156,6 +156,10 @@ class Browser:
         self.mouse("mousePressed", *at)
         return at
 
+    def key(self, kind: str, key: str) -> None:
+        """Sends an event of a key, as the element with the focus gets it: keyDown or keyUp."""
+        self._call("Input.dispatchKeyEvent", type=kind, key=key, code={" ": "Space"}.get(key, key))
+
     def show(self, width: int, height: int, dark: bool) -> None:
         """Sets the size of the page, and the colour scheme that its reader prefers."""
         self._call(

@@ -212,3 +212,21 @@ def test_bounds_are_a_pale_area_with_edges_and_read_as_bounds(browser, esc, port
     legend = "document.querySelector('#plots .plot:nth-child(2) .u-legend').textContent"
     browser.wait(f"/a-[23][.\\d]* … [23][.\\d]*b/.test({legend})")
     assert browser.problems == []
+
+
+def test_after_arming_space_and_arrows_turn_the_motor_as_the_hint_says(browser, esc, port):
+    look(browser, port)
+    assert "in focus, which arming gives it" in browser.text("#throttle-hint")
+    browser.click("#arm")
+    browser.wait("document.querySelector('#drive').textContent.includes('armed')")
+    esc.next("HEARTBEAT", lambda m: m.base_mode & 128)
+    browser.key("keyDown", " ")
+    for _ in range(10):
+        browser.key("keyDown", "ArrowUp")
+        browser.key("keyUp", "ArrowUp")
+    assert browser.run("document.querySelector('#throttle').value") == "20"
+    esc.wait_rpm(1000, 2000)
+    browser.key("keyUp", " ")
+    assert browser.run("document.querySelector('#throttle').value") == "0"
+    esc.wait_rpm(-100, 600)
+    assert browser.problems == []

@@ -75,6 +75,8 @@ export class ThrottleHandle {
     this.signal = signal;
     this.slider.disabled = !armed;
     element("arm").textContent = armed ? "Disarm" : "Arm";
+    // Its keys are of use at once.
+    if (armed) this.slider.focus();
     this.hold(false);
     this.letGo();
   }
