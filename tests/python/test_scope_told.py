@@ -1,6 +1,7 @@
 """What the page tells a person: why something was refused, what state the ESC is in, what is known no more."""
 
 import json
+import re
 from xml.etree import ElementTree
 
 from scope import browser, esc, look, port, spin  # noqa: F401  (fixtures)
@@ -135,7 +136,7 @@ def test_without_the_program_nothing_looks_live_and_nothing_can_be_pressed(brows
     # What was seen can still be looked at, and saved.
     assert set(left) == {
         "show-scope", "show-parameters", "theme", "pause", "live", "span", "zoom-in", "zoom-out", "trigger",
-        "trigger-channel", "trigger-value", "trigger-edge", "export-svg", "export-png", "export-csv",
+        "trigger-channel", "trigger-value", "trigger-edge", "unmark", "export-svg", "export-png", "export-csv",
     }  # fmt: skip
     # It looks for its program, in vain.
     assert all("WebSocket" in problem for problem in browser.problems)
@@ -229,4 +230,35 @@ def test_after_arming_space_and_arrows_turn_the_motor_as_the_hint_says(browser, 
     browser.key("keyUp", " ")
     assert browser.run("document.querySelector('#throttle').value") == "0"
     esc.wait_rpm(-100, 600)
+    assert browser.problems == []
+
+
+def test_marks_are_cleared_and_a_zoom_has_its_span(browser, esc, port):
+    look(browser, port)
+    span = "document.querySelector('#span').selectedOptions[0]?.textContent"
+    assert browser.run(span) == "2 s"
+    # As long as the ESC has run there is something to look at.
+    browser.run("new Promise((resolve) => setTimeout(resolve, 2500))")
+    browser.click("#pause")
+    box = browser.box("#plots .u-over")
+    y = box["y"] + box["height"] / 2
+    ends = [box["x"] + share * box["width"] for share in (0.25, 0.75)]
+    for name, x in zip("ab", ends):
+        browser.mouse("mouseMoved", x, y)
+        browser.wait("document.querySelector('#plots .u-value').textContent !== '–'")
+        browser.key("keyDown", name)
+    assert re.fullmatch(r"A .* s, B .* s, B − A (99\d|100\d)\.\d+ ms, .* Hz", browser.text("#cursors"))
+    browser.click("#unmark")
+    assert browser.text("#cursors") == ""
+    assert browser.run("document.querySelector('#unmark').hidden")
+
+    browser.mouse("mousePressed", ends[0], y)
+    browser.mouse("mouseMoved", ends[1], y)
+    browser.mouse("mouseReleased", ends[1], y)
+    browser.wait(f"/^(99\\d|1(\\.0\\d)?) (ms|s)$/.test({span})")
+    browser.click("#zoom-in")
+    browser.click("#zoom-in")
+    browser.wait(f"/^2[45]\\d ms$/.test({span})")
+    browser.run("document.querySelector('#span').value = 0.1; document.querySelector('#span').dispatchEvent(new Event('change'))")
+    assert browser.run("document.querySelectorAll('#span .zoomed').length") == 0
     assert browser.problems == []

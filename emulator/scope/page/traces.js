@@ -10,6 +10,12 @@ const ALWAYS = ["rpm", "i_d_a", "i_q_a", "u_d_v", "u_q_v", "bus_v", "bus_a", "to
 
 const element = (id) => document.getElementById(id);
 
+/** A span of time to three digits, in the unit that fits. */
+function spelt(span) {
+  const [unit, factor] = span < 1e-3 ? ["µs", 1e6] : span < 1 ? ["ms", 1e3] : ["s", 1];
+  return `${+(span * factor).toPrecision(3)} ${unit}`;
+}
+
 export class Traces {
   /** `seen` hears each piece that is drawn. */
   constructor(link, plots, seen) {
@@ -24,6 +30,7 @@ export class Traces {
     element("zoom-in").addEventListener("click", () => this.zoom(this.span / 2));
     element("zoom-out").addEventListener("click", () => this.zoom(this.span * 2));
     element("trigger").addEventListener("change", () => this.arm());
+    element("unmark").addEventListener("click", () => this.unmark());
     document.addEventListener("keydown", (event) => this.key(event));
     this.loop();
   }
@@ -34,8 +41,7 @@ export class Traces {
     this.source = source;
     this.spans = isSlow ? SLOW_SPANS : SPANS;
     this.span = isSlow ? DEFAULT_SPAN_S.slow : DEFAULT_SPAN_S.fast;
-    const told = (span) => (span < 1 ? `${span * 1000} ms` : `${span} s`);
-    element("span").replaceChildren(...this.spans.map((span) => new Option(told(span), span, false, span === this.span)));
+    element("span").replaceChildren(...this.spans.map((span) => new Option(spelt(span), span)));
     const usual = isSlow ? "rpm" : "i_a_a";
     element("trigger-channel").replaceChildren(...source.channels.map((name) => new Option(name, name, false, name === usual)));
     this.live();
@@ -65,15 +71,24 @@ export class Traces {
     this.span = Math.min(Math.max(span, 1e-4), this.spans.at(-1));
     // About the middle of what a person looks at.
     if (this.paused) this.to = this.to - old / 2 + this.span / 2;
-    element("span").value = this.spans.includes(this.span) ? this.span : "";
-    this.dirty = true;
+    this.showSpan();
   }
 
   look(from, to) {
     this.pause(true);
     this.to = to;
     this.span = to - from;
-    element("span").value = "";
+    this.showSpan();
+  }
+
+  /** One that was zoomed to stands above the usual ones. */
+  showSpan() {
+    const select = element("span");
+    select.querySelector(".zoomed")?.remove();
+    if (!this.spans.includes(this.span)) {
+      select.prepend(Object.assign(new Option(spelt(this.span), this.span), { className: "zoomed" }));
+    }
+    select.value = this.span;
     this.dirty = true;
   }
 
@@ -84,7 +99,7 @@ export class Traces {
       p: () => this.pause(!this.paused), l: () => this.live(),
       "+": () => this.zoom(this.span / 2), "-": () => this.zoom(this.span * 2),
       ArrowLeft: () => pan(-0.25), ArrowRight: () => pan(0.25),
-      a: () => this.mark("A"), b: () => this.mark("B"),
+      a: () => this.mark("A"), b: () => this.mark("B"), c: () => this.unmark(),
     };
     if (!keys[event.key] || element("scope").hidden) return;
     keys[event.key]();
@@ -94,10 +109,21 @@ export class Traces {
   mark(name) {
     const { marks, cursor } = this.plots;
     marks[name] = marks[name] == null || marks[name] !== cursor ? cursor : null;
-    const { A, B } = marks;
+    this.showMarks();
+  }
+
+  /** Takes off those that a person has set. */
+  unmark() {
+    Object.assign(this.plots.marks, { A: null, B: null });
+    this.showMarks();
+  }
+
+  showMarks() {
+    const { A, B } = this.plots.marks;
     const apart = A != null && B != null ? `, B − A ${((B - A) * 1e3).toFixed(3)} ms, ${(1 / Math.abs(B - A)).toFixed(2)} Hz` : "";
-    const told = Object.entries(marks).filter(([, t]) => t != null).map(([name, t]) => `${name} ${t.toFixed(5)} s`);
+    const told = Object.entries({ A, B }).filter(([, t]) => t != null).map(([name, t]) => `${name} ${t.toFixed(5)} s`);
     element("cursors").textContent = told.join(", ") + apart;
+    element("unmark").hidden = told.length === 0;
     this.dirty = true;
   }
 
