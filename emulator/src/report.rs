@@ -233,7 +233,7 @@ pub fn verdicts(outcome: &Outcome) -> String {
         match verdict.held {
             Some(held) => {
                 let held = if held { "held" } else { "FAILED" };
-                line(&mut text, format_args!("{held}: {}", sentence(verdict)));
+                line(&mut text, format_args!("{held}: {}", verdict.sentence()));
             }
             None => line(
                 &mut text,
@@ -278,7 +278,7 @@ pub fn survey(survey: &Survey) -> String {
         line(&mut text, format_args!("warning in {runs}: {warning}"));
     }
     for failure in &survey.failures {
-        let broken: Vec<_> = failure.expectations.iter().map(sentence).collect();
+        let broken: Vec<_> = failure.expectations.iter().map(Verdict::sentence).collect();
         line(
             &mut text,
             format_args!("failed: {}: {}", failure.options, broken.join("; ")),
@@ -306,16 +306,6 @@ pub fn survey(survey: &Survey) -> String {
         );
     }
     text
-}
-
-fn sentence(verdict: &Verdict) -> String {
-    format!(
-        "{}.{} is {}, wanted {}",
-        verdict.window,
-        verdict.key,
-        number(verdict.value),
-        verdict.wanted
-    )
 }
 
 fn number(value: Option<f64>) -> String {

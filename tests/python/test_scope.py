@@ -300,6 +300,12 @@ signal = [
     { at_s = 3.5, throttle = 0.0 },
 ]
 fault = [{ at_s = 3.0, for_s = 0.3, kind = "bus_sag", value = 2.0 }]
+window = [{ name = "steady", t0_s = 2.5, t1_s = 3.0 }]
+expect = [
+    { window = "steady", key = "rpm_mean", equals = 3150.0, within = 60.0 },
+    { window = "run", key = "faults", equals = 0 },
+    { window = "steady", key = "bus_v_mean", below = 20.0 },
+]
 """
 
 
@@ -311,7 +317,11 @@ def test_a_scenario_is_played_on_what_runs(browser, esc, port):
     play(browser, SCENARIO)
     esc.next("ESC_STATUS", lambda m: abs(m.rpm[0] - HOLD_RPM) < 60)
     esc.next("ESC_STATUS", lambda m: abs(m.voltage[0] - 22.0) < 0.3)
-    browser.wait(f"{events}.includes('Scenario: over')")
+    browser.wait(f"{events}.includes('Scenario: over; 2 of 3 expectations held; no fault')")
+    told = browser.text("#events")
+    assert re.search(r"Held: steady\.rpm_mean is 31\d\d[.\d]*, wanted 3150 ± 60", told)
+    assert "Held: run.faults is 0, wanted 0 ± 0" in told
+    assert re.search(r"FAILED: steady\.bus_v_mean is 2[34][.\d]*, wanted below 20", told)
     esc.wait_rpm(-100, 1000)
 
     # Stopped by a person, it does not continue.

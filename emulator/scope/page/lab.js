@@ -77,10 +77,17 @@ export class Lab {
     this.told(`Scenario: ${file.name} begins`);
   }
 
-  /** It has come to its end. */
-  over() {
+  /** It has come to its end, with these faults, null if unknown, and these expectations, each a sentence and whether
+   * it held, null if unknown. */
+  over({ faults, expectations }) {
     this.plays = false;
-    this.told("Scenario: over");
+    for (const [sentence, held] of expectations.toReversed()) {
+      this.told(`${held === null ? "Not seen" : held ? "Held" : "FAILED"}: ${sentence}`, held === false);
+    }
+    const held = expectations.filter(([, held]) => held).length;
+    const verdict = expectations.length ? `${held} of ${expectations.length} expectations held` : "it expects nothing";
+    const seen = faults?.length ? `faults: ${faults.join(", ")}` : faults ? "no fault" : null;
+    this.told(["Scenario: over", verdict, seen].filter(Boolean).join("; "), expectations.some(([, held]) => held === false));
   }
 
   refused() {

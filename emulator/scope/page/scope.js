@@ -90,7 +90,7 @@ const handlers = {
   trace: (buffer) => remote.take(buffer),
   fitted: (content) => lab.fitted(content),
   stands: (content) => lab.stands(content),
-  scenario: () => lab.over(),
+  scenario: (ending) => lab.over(ending),
   switching: (seen) => switches.take(seen),
   mavlink(message) {
     if (message.name === "HEARTBEAT" && mayBeEsc(message)) heartbeat(message);

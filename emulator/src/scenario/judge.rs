@@ -31,6 +31,15 @@ impl Verdict {
     pub fn failed(&self) -> bool {
         self.held == Some(false)
     }
+
+    /// Says what was found and what was wanted.
+    pub fn sentence(&self) -> String {
+        let value = self
+            .value
+            .map_or_else(|| "no data".to_owned(), |value| value.to_string());
+        let (window, key, wanted) = (&self.window, &self.key, &self.wanted);
+        format!("{window}.{key} is {value}, wanted {wanted}")
+    }
 }
 
 /// Compares a figure with its expectation.

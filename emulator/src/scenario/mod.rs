@@ -58,7 +58,7 @@ pub use outcome::Outcome;
 pub use place::Place;
 use play::Played;
 pub use run::Run;
-pub use script::Script;
+pub use script::{Ending, Script};
 pub use stand::{Standing, stand};
 pub use survey::{Expected, Failure, Refusal, Survey};
 pub use table::{Cell, Row, Table};

@@ -210,7 +210,7 @@ pub(super) fn check(scenario: &Scenario) -> Result<(), ScenarioError> {
 }
 
 /// Returns the measuring windows: those of the file, and the whole run if an expectation names it.
-fn windows(scenario: &Scenario) -> impl Iterator<Item = (String, f64, f64)> {
+pub(super) fn windows(scenario: &Scenario) -> impl Iterator<Item = (String, f64, f64)> {
     let tables = scenario.window.iter();
     let tables = tables.map(|window| (window.name.clone(), window.t0_s, window.t1_s));
     let whole = scenario.window.iter().all(|window| window.name != RUN)

@@ -1,20 +1,22 @@
-//! A scenario's throttle and faults, played on what is already running.
+//! A scenario's throttle and faults, played on what is already running, and its expectations of that.
 //!
-//! The bench and the ESC's knowledge stay as they are: `[bench]` and `[params]` are for a separate run, and so are
-//! windows and expectations.
+//! The bench and the ESC's knowledge stay as they are: `[bench]` and `[params]` are for a separate run.
 
 use std::path::Path;
 
+use serde::Serialize;
 use toml::Value;
 
 use super::error::ScenarioError;
-use super::file::Scenario;
+use super::file::{Expectation, Scenario};
+use super::judge::judge;
 use super::lines::reason;
 use super::signal::{Demand, Signal, demand};
 use crate::fault::Fault;
+use crate::summary::Summary;
 
 /// The parts of a file that are played; of the bench only its duration.
-const KEPT: [&str; 3] = ["bench", "signal", "fault"];
+const KEPT: [&str; 5] = ["bench", "signal", "fault", "window", "expect"];
 
 /// What is played.
 pub struct Script {
@@ -22,6 +24,17 @@ pub struct Script {
     /// By start time.
     faults: Vec<Fault>,
     duration_s: f64,
+    windows: Vec<(String, f64, f64)>,
+    expect: Vec<Expectation>,
+}
+
+/// How a play ended.
+#[derive(Clone, Debug, Serialize)]
+pub struct Ending {
+    /// The faults that occurred; `None` if the control is not visible.
+    pub faults: Option<Vec<&'static str>>,
+    /// Each expectation, in a sentence, and whether it held; `None` if that cannot be seen.
+    pub expectations: Vec<(String, Option<bool>)>,
 }
 
 impl Script {
@@ -68,9 +81,11 @@ impl Script {
         let mut faults = scenario.faults().map_err(line)?;
         faults.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
         Ok(Self {
+            windows: super::play::windows(&scenario).collect(),
             signals: scenario.signal,
             faults,
             duration_s: scenario.bench.duration_s,
+            expect: scenario.expect,
         })
     }
 
@@ -83,6 +98,28 @@ impl Script {
             Some(Demand::Throttle(throttle)) => Some(throttle),
             _ => Some(0.0),
         }
+    }
+
+    /// Returns a summary of its windows, for periods by their time after its start.
+    pub fn summary(&self) -> Summary {
+        Summary::new(self.windows.iter().cloned())
+    }
+
+    /// Compares the figures of the whole play with what is expected.
+    ///
+    /// # Errors
+    /// A line on an expectation that means nothing; [`Self::read`] has refused those.
+    pub fn ending(&self, summary: &Summary) -> Result<Ending, String> {
+        let report = summary.report(self.duration_s, 0.0);
+        let verdicts = self.expect.iter().map(|expected| {
+            let verdict = judge(expected, &report).map_err(|error| error.to_string())?;
+            Ok((verdict.sentence(), verdict.held))
+        });
+        let expectations = verdicts.collect::<Result<_, String>>()?;
+        Ok(Ending {
+            faults: report.faults,
+            expectations,
+        })
     }
 
     /// Returns the faults, by start time relative to its start.

@@ -24,7 +24,7 @@ pub(super) enum FromPage {
     Standing { esc: usize },
     /// Another motor with its load and supply: a bench of the library.
     Fit { esc: usize, bench: String },
-    /// A scenario's throttle and faults, as text. Throttle or silence from this page ends it.
+    /// A scenario's throttle and faults, as text, and what is expected of them. Throttle or silence from this page ends it.
     Scenario { esc: usize, text: String },
     /// A fault that begins now, by its keys as `--fault` takes them.
     Fault { esc: usize, keys: String },

@@ -158,13 +158,24 @@ impl Web {
     /// Advances what is being played.
     fn go_on(&mut self, now: Instant, machine: &mut impl Machine) {
         for (esc, place) in self.playing.iter_mut().enumerate() {
-            let Some(playing) = place else { continue };
+            let Some(playing) = place else {
+                self.taps.measured(esc);
+                continue;
+            };
             let told = match playing.play(now, &mut self.throttles[esc], esc, machine) {
                 Stage::GoesOn => continue,
-                Stage::Over => serde_json::json!({ "scenario": "over" }),
+                Stage::Over => {
+                    let script = playing.script();
+                    let summary = self.taps.measured(esc);
+                    match script.ending(&summary.unwrap_or_else(|| script.summary())) {
+                        Ok(ending) => serde_json::json!({ "scenario": ending }),
+                        Err(reason) => serde_json::json!({ "refused": reason }),
+                    }
+                }
                 Stage::Refused(reason) => serde_json::json!({ "refused": reason }),
             };
             self.site.tell(Some(playing.viewer()), &told.to_string());
+            self.taps.measured(esc);
             *place = None;
         }
     }
@@ -216,6 +227,8 @@ impl Web {
             }
             FromPage::Scenario { text, .. } => {
                 let script = Script::read(&text)?;
+                self.taps
+                    .measure(esc, script.summary(), now_ns as f64 * 1e-9);
                 self.playing[esc] = Some(Playing::new(from.0, script, now_ns));
                 Ok(())
             }

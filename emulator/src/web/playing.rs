@@ -48,6 +48,11 @@ impl Playing {
         self.viewer
     }
 
+    /// Returns what is played.
+    pub(super) fn script(&self) -> &Script {
+        &self.script
+    }
+
     /// Does what is due.
     pub(super) fn play(
         &mut self,

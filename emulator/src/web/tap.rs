@@ -12,6 +12,7 @@ use super::switching::{Look, Switching};
 use crate::machine::Onlooker;
 use crate::plant::Gate;
 use crate::rig::{Period, Rig};
+use crate::summary::Summary;
 use crate::surroundings::{Motion, Passage};
 
 /// The tap of one ESC.
@@ -22,6 +23,8 @@ pub(super) struct Tap {
     chunk: Option<Chunk>,
     throttle: f32,
     look: Look,
+    /// The figures of what is played, and when that began, s.
+    measured: Option<(Summary, f64)>,
     /// The requested periods, with their requesters; `None` if unknown.
     seen: Vec<(Vec<ViewerId>, Option<Switching>)>,
 }
@@ -34,6 +37,7 @@ impl Tap {
             chunk: None,
             throttle: 0.0,
             look: Look::default(),
+            measured: None,
             seen: Vec::new(),
         }
     }
@@ -72,6 +76,9 @@ impl Tap {
     }
 
     fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
+        if let Some((summary, begun_s)) = &mut self.measured {
+            summary.add(t_s - *begun_s, period, rig);
+        }
         if self.chunk.is_some() {
             if self.look.is_asked() {
                 self.see(t_s, period, rig);
@@ -89,6 +96,9 @@ impl Tap {
     }
 
     fn passage(&mut self, t_s: f64, passage: &Passage) {
+        if let Some((summary, begun_s)) = &mut self.measured {
+            summary.pass(t_s - *begun_s, passage);
+        }
         if let Some(viewers) = self.look.unknown() {
             self.seen.push((viewers, None));
         }
@@ -116,6 +126,16 @@ impl Taps {
     /// Calls [`Tap::look`] of one.
     pub(super) fn look(&mut self, esc: usize, throttle: f64) {
         self.each[esc].look(throttle);
+    }
+
+    /// Measures what is played on an ESC from `begun_s` on.
+    pub(super) fn measure(&mut self, esc: usize, summary: Summary, begun_s: f64) {
+        self.each[esc].measured = Some((summary, begun_s));
+    }
+
+    /// Takes what was measured.
+    pub(super) fn measured(&mut self, esc: usize) -> Option<Summary> {
+        self.each[esc].measured.take().map(|(summary, _)| summary)
     }
 
     /// Requests a PWM period of an ESC for a viewer.
@@ -163,6 +183,11 @@ impl<O: Onlooker> Onlooker for Tapped<'_, O> {
 
     fn tasks(&mut self, telemetry: &Telemetry) {
         self.onlooker.tasks(telemetry);
+        if let Some(taps) = &mut self.taps
+            && let Some((summary, _)) = &mut taps.each[taps.esc].measured
+        {
+            summary.told(telemetry);
+        }
     }
 
     fn edge(&mut self, time_ns: u64, level: bool) {

@@ -283,3 +283,28 @@ fn a_motor_is_one_of_the_library_and_no_file() {
         desk.answer(&mut page, key);
     }
 }
+
+#[test]
+fn a_scenario_ends_with_what_held_of_its_expectations() {
+    let mut desk = Desk::new();
+    let mut page = desk.page();
+    page.read().unwrap();
+    let text = "bench.duration_s = 0.3
+        signal = [{ at_s = 0.0, throttle = 0.0 }]
+        window = [{ name = \"rest\", t0_s = 0.1, t1_s = 0.2 }]
+        expect = [
+            { window = \"rest\", key = \"rpm_max\", below = 1.0 },
+            { window = \"rest\", key = \"bus_v_mean\", above = 30.0 },
+            { window = \"run\", key = \"faults\", equals = 0 },
+        ]";
+    ask(
+        &mut page,
+        &json!({ "scenario": { "esc": 0, "text": text } }),
+    );
+    let ending = desk.answer(&mut page, "scenario");
+    assert_eq!(ending["faults"], json!([]));
+    let held: Vec<_> = (0..3)
+        .map(|i| ending["expectations"][i][1].clone())
+        .collect();
+    assert_eq!(held, [true, false, true], "{ending}");
+}
