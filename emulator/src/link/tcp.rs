@@ -5,6 +5,7 @@ use std::io::{self, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::time::Duration;
 
+use mavlink::{MAV_STX, MAV_STX_V2};
 use siskin_scope::HostPort;
 
 use super::socket::{resolve, socket_error};
@@ -23,6 +24,9 @@ const MAX_PENDING_BYTES: usize = 256 * 1024;
 
 /// Bytes read from a client per call, 16 MB a second with one call a millisecond.
 const READ_BYTES: usize = 16 * 1024;
+
+/// What a frame begins with, of MAVLink 2 and of 1.
+const STARTS: [u8; 2] = [MAV_STX_V2, MAV_STX];
 
 /// The port and its clients.
 pub(super) struct TcpServer {
@@ -116,12 +120,12 @@ impl TcpServer {
 }
 
 impl Client {
-    /// Reads once. The end of the stream is an error, and so is an HTTP request: any page in a browser on this machine
-    /// could hide frames in one.
+    /// Reads once. The end of the stream is an error, and so is a first byte that begins no frame: any page in a browser
+    /// on this machine could hide frames in a request of whatever method or protocol.
     fn receive(&mut self, inbox: &mut Inbox<'_>) -> io::Result<()> {
         match self.stream.read(&mut inbox.buffer[..READ_BYTES]) {
             Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
-            Ok(length) if !self.begun && is_http(&inbox.buffer[..length]) => {
+            Ok(_) if !self.begun && !STARTS.contains(&inbox.buffer[0]) => {
                 Err(io::ErrorKind::InvalidData.into())
             }
             Ok(length) => {
@@ -153,14 +157,6 @@ impl Client {
         self.pending.extend(frame);
         self.flush()
     }
-}
-
-/// Returns true if a client's first bytes are what a browser sends, or part of it.
-fn is_http(first: &[u8]) -> bool {
-    let methods: [&[u8]; 4] = [b"GET ", b"HEAD ", b"OPTIONS ", b"POST "];
-    methods
-        .iter()
-        .any(|method| first.starts_with(method) || method.starts_with(first))
 }
 
 impl Link for TcpServer {

@@ -14,6 +14,14 @@ use super::*;
 
 const MS: Duration = Duration::from_millis(1);
 
+/// What a client's stream begins with: a frame's first byte.
+const START: [u8; 1] = [0xFD];
+
+/// A client's first bytes.
+fn first(text: &[u8]) -> Vec<u8> {
+    [&START, text].concat()
+}
+
 /// Open links, what each live stream received, and which streams have ended.
 struct Bench {
     links: Links,
@@ -56,8 +64,12 @@ impl Bench {
         panic!("not within 5000 turns; streams {:?}", self.streams);
     }
 
+    /// Whether a stream has brought this, after what [`first`] puts before it.
     fn heard(&self, text: &[u8]) -> bool {
-        self.streams.values().any(|bytes| bytes == text)
+        let bytes = self.streams.values();
+        bytes
+            .map(|bytes| bytes.strip_prefix(&START).unwrap_or(bytes))
+            .any(|bytes| bytes == text)
     }
 
     /// Returns where the link of this index listens.
@@ -82,7 +94,7 @@ impl Bench {
     fn connect_two(&mut self) -> [TcpStream; 2] {
         let mut clients = [self.connect(0), self.connect(0)];
         for (client, name) in clients.iter_mut().zip([b"one", b"two"]) {
-            client.write_all(name).unwrap();
+            client.write_all(&first(name)).unwrap();
         }
         self.until(MS, |b| b.heard(b"one") && b.heard(b"two"));
         clients
@@ -230,7 +242,7 @@ fn tcp_serves_several_clients_of_which_one_comes_back() {
     assert_eq!(read(&mut two, 6), b"to two");
 
     let mut one = bench.connect(0);
-    one.write_all(b"back").unwrap();
+    one.write_all(&first(b"back")).unwrap();
     bench.until(MS, |b| b.heard(b"back") && b.heard(b"two"));
     bench.links.send(b"to both again");
     assert_eq!(read(&mut one, 13), b"to both again");
@@ -244,14 +256,26 @@ fn tcp_serves_several_clients_of_which_one_comes_back() {
 #[test]
 fn a_page_of_a_browser_is_no_client_whatever_its_request_carries() {
     let mut bench = Bench::open(&["tcpin:127.0.0.1:0"]);
-    for (count, first) in [&b"POST / HTTP/1.1\r\n\r\n"[..], b"GET /", b"P"]
-        .iter()
-        .enumerate()
-    {
+    let begins = [
+        &b"POST / HTTP/1.1\r\n\r\n"[..],
+        b"GET /",
+        b"P",
+        // Any method can be asked for, and a secure page begins otherwise.
+        b"PUT / HTTP/1.1\r\n\r\n\xFD",
+        b"X",
+        b"\x16\x03\x01",
+        b"\r\n\xFD",
+    ];
+    for (count, begin) in begins.iter().enumerate() {
         let mut page = bench.connect(0);
-        page.write_all(first).unwrap();
+        page.write_all(begin).unwrap();
         bench.until(MS, |b| b.ended.len() == count + 1);
         assert!(bench.streams.is_empty());
+    }
+    for start in [0xFD, 0xFE] {
+        let mut client = bench.connect(0);
+        client.write_all(&[start, 0]).unwrap();
+        bench.until(MS, |b| b.streams.values().any(|bytes| bytes == &[start, 0]));
     }
 }
 
@@ -286,7 +310,7 @@ fn clients_beyond_the_limit_are_turned_away() {
     let mut clients = Vec::new();
     for index in 0..32_u8 {
         let mut client = bench.connect(0);
-        client.write_all(&[index]).unwrap();
+        client.write_all(&first(&[index])).unwrap();
         bench.until(MS, |b| b.heard(&[index]));
         clients.push(client);
     }
@@ -304,7 +328,7 @@ fn a_silent_client_makes_room_for_the_next() {
     let mut clients = Vec::new();
     for index in 0..32_u8 {
         let mut client = bench.connect(0);
-        client.write_all(&[index]).unwrap();
+        client.write_all(&first(&[index])).unwrap();
         bench.until(MS, |b| b.heard(&[index]));
         clients.push(client);
     }
@@ -313,10 +337,10 @@ fn a_silent_client_makes_room_for_the_next() {
         client.write_all(b".").unwrap();
     }
     bench.until(MS, |b| {
-        b.streams.values().filter(|bytes| bytes.len() == 2).count() == 31
+        b.streams.values().filter(|bytes| bytes.len() == 3).count() == 31
     });
     let mut late = bench.connect(0);
-    late.write_all(b"late").unwrap();
+    late.write_all(&first(b"late")).unwrap();
     bench.until(MS, |b| b.heard(b"late"));
     assert_eq!(clients[0].read(&mut [0]).unwrap(), 0, "it was closed");
     assert_eq!((bench.streams.len(), bench.ended.len()), (32, 1));
@@ -331,7 +355,7 @@ fn a_frame_goes_to_every_link() {
     let mut client = bench.connect(1);
     let (peer, _) = udp_socket();
     peer.send_to(b"peer", bench.address(2)).unwrap();
-    client.write_all(b"client").unwrap();
+    client.write_all(&first(b"client")).unwrap();
     bench.until(MS, |b| b.heard(b"peer") && b.heard(b"client"));
     bench.links.send(b"frame");
     assert_eq!(read(&mut client, 5), b"frame");
