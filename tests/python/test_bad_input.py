@@ -128,6 +128,13 @@ def test_a_storage_that_is_all_noise_is_refused_and_left_alone(tmp_path, start, 
         ("[bench]\nload = 'nowhere/load.toml'", "line 2: bench.load: "),
         ("[bench]\nseed = 1\n[bench.motor]\nR = -1.0\nL = 1e-5\nflux = 1e-3\npole_pairs = 7",
          "line 4: bench.motor.R: motor: R = -1"),
+        # What nothing can meet, or nothing can miss.
+        ("[[expect]]\nwindow = 'run'\nkey = 'faults'\nequals = nan", "line 4: expect.0.equals: NaN is no bound"),
+        ("[[expect]]\nwindow = 'run'\nkey = 'faults'\nbelow = inf", "line 4: expect.0.below: inf is no bound"),
+        ("[[expect]]\nwindow = 'run'\nkey = 'faults'\nequals = 0\nwithin = -1.0", "line 5: expect.0.within: -1 is less"),
+        ("[[window]]\nname = 'a'\nt0_s = -inf\nt1_s = 1.0", "line 3: window.0.t0_s: the window a begins before"),
+        ("[sweep]\n'expect.0.equals' = [nan]\n[[expect]]\nwindow = 'run'\nkey = 'faults'\nequals = 0",
+         "line 2: expect.0.equals: NaN is no bound"),
         # For mOhm, uH, mWb and g cm^2.
         ("[bench]\nmotor = { R = 33.0, L = 1e-5, flux = 1e-3, pole_pairs = 7 }",
          "line 2: bench.motor.R: motor: R = 33 is out of range; give 0.001 to 10 ohm"),

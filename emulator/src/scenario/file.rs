@@ -215,6 +215,31 @@ pub(super) struct Expectation {
     pub(super) within: Option<f64>,
 }
 
+impl Expectation {
+    /// Returns a key with what is wrong with its value: nothing compares with NaN, and whatever there is is below
+    /// infinity, so that such an expectation would not say anything.
+    pub(super) fn problem(&self) -> Option<(&'static str, String)> {
+        let bounds = [
+            ("below", self.below),
+            ("above", self.above),
+            ("equals", self.equals),
+            ("within", self.within),
+        ];
+        let given = bounds
+            .iter()
+            .filter_map(|(key, bound)| Some((*key, (*bound)?)));
+        for (key, bound) in given {
+            if !bound.is_finite() {
+                return Some((key, format!("{bound} is no bound; give a finite number")));
+            }
+            if key == "within" && bound < 0.0 {
+                return Some((key, format!("{bound} is less than nothing; give 0 or more")));
+            }
+        }
+        None
+    }
+}
+
 impl BenchTable {
     /// Returns the bench.
     pub(super) fn bench(&self) -> Result<Bench, ScenarioError> {

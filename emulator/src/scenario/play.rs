@@ -195,6 +195,9 @@ pub(super) fn check(scenario: &Scenario) -> Result<(), ScenarioError> {
             return Err(wrong("t1_s", "has no time between t0_s and t1_s"));
         }
         // Its figures would cover a part of it, or nothing.
+        if window.t0_s < 0.0 {
+            return Err(wrong("t0_s", "begins before the scenario"));
+        }
         if window.t1_s > end_s {
             return Err(wrong("t1_s", &after("ends")));
         }
@@ -204,6 +207,12 @@ pub(super) fn check(scenario: &Scenario) -> Result<(), ScenarioError> {
         let wrong = |error: ScenarioError| {
             ScenarioError::of_key(format!("expect.{index}"), error.to_string())
         };
+        if let Some((key, problem)) = expected.problem() {
+            return Err(ScenarioError::of_key(
+                format!("expect.{index}.{key}"),
+                problem,
+            ));
+        }
         judge(expected, &report).map_err(wrong)?;
     }
     Ok(())
