@@ -25,10 +25,17 @@ use cli::{BenchArgs, Cli, Command, MatrixArgs, Paper, PlotArgs, ReproduceArgs};
 /// Progress of a sweep and the time it still takes.
 const PROGRESS: &str = "{wide_bar} {pos} of {len} runs, {eta} to go";
 
+/// The program, as its complaints begin.
+const PROGRAM: &str = "siskin-emulator";
+
+fn complain(line: &str) {
+    options::complain(PROGRAM, line);
+}
+
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) => return options::usage("siskin-emulator", &error),
+        Err(error) => return options::usage(PROGRAM, &error),
     };
     let result = match cli.command {
         None => run(cli.run),
@@ -42,7 +49,7 @@ fn main() -> ExitCode {
     match result {
         Ok(status) => status,
         Err(line) => {
-            eprintln!("siskin-emulator: {line}");
+            complain(&line);
             ExitCode::from(2)
         }
     }
@@ -55,8 +62,7 @@ fn run(args: RunArgs) -> Result<ExitCode, String> {
     }
     let standing = args.standing().map_err(|error| line(&error))?;
     let (session, warning) = args.session(&standing).map_err(|error| line(&error))?;
-    let warn = |warning: &str| eprintln!("siskin-emulator: {warning}");
-    warning.as_deref().into_iter().for_each(warn);
+    warning.as_deref().into_iter().for_each(complain);
     let opened = |opened: &Opened, rack: &Rack| {
         let params = rack.escs()[0].esc().params();
         report::opened("emulated", &args, &standing, opened, params);
@@ -64,9 +70,9 @@ fn run(args: RunArgs) -> Result<ExitCode, String> {
     let report = match args.speed {
         Speed::Paced(_) => {
             let start = |starts| Ok(Rack::start(starts)?);
-            live::run(session, start, opened, warn).map(|(report, _)| report)
+            live::run(session, start, opened, complain).map(|(report, _)| report)
         }
-        Speed::Lockstep => lockstep::serve(session, opened, warn),
+        Speed::Lockstep => lockstep::serve(session, opened, complain),
     };
     let report = report.map_err(|error| line(&error))?;
     report::print(&if args.common.json {

@@ -8,6 +8,7 @@ use std::time::Duration;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use siskin_control::params::{ParamId, Preset};
+use siskin_scope::printable;
 
 use crate::bench::library;
 use crate::fault::Fault;
@@ -278,8 +279,13 @@ pub fn usage(program: &str, error: &clap::Error) -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let what = one_line(&error.to_string());
-    eprintln!("{program}: {what}; try --help");
+    complain(program, &format!("{what}; try --help"));
     ExitCode::from(2)
+}
+
+/// Tells the user a line on standard error; what of it comes from a file cannot command the terminal.
+pub fn complain(program: &str, line: &str) {
+    eprintln!("{program}: {}", printable::line(line));
 }
 
 /// Returns the argument parser's complaint and its hint on one line, without the usage that follows.

@@ -6,6 +6,7 @@ use std::io::{self, Write as _};
 
 use serde::Serialize;
 use siskin_control::params::{ParamId, Params};
+use siskin_scope::printable;
 
 use crate::bench::DEFAULT_MOTOR;
 use crate::interrupt;
@@ -156,7 +157,7 @@ fn greeting(
         param(ParamId::InpArmMs)
     ));
     lines.push("README.md has a script that does so. Ctrl-C ends.".to_owned());
-    lines.join("\n") + "\n"
+    printable::lines(&(lines.join("\n") + "\n"))
 }
 
 /// Returns the option with which `siskin` reaches one of these, servers first; empty for the one that it finds by
@@ -217,7 +218,7 @@ pub fn figures(report: &Report) -> String {
             ),
         );
     }
-    text
+    printable::lines(&text)
 }
 
 /// Formats whether a scenario's expectations held.
@@ -244,7 +245,7 @@ pub fn verdicts(outcome: &Outcome) -> String {
             ),
         }
     }
-    text
+    printable::lines(&text)
 }
 
 /// Formats the results of many runs.
@@ -305,7 +306,7 @@ pub fn survey(survey: &Survey) -> String {
             ),
         );
     }
-    text
+    printable::lines(&text)
 }
 
 fn number(value: Option<f64>) -> String {

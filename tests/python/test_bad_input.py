@@ -290,3 +290,46 @@ def test_a_scenario_that_is_no_text_is_refused(tmp_path):
     path = tmp_path / "bad.toml"
     path.write_bytes(b"\xff\xfe\x00bench")
     assert str(path) in refused("scenario", path)
+
+
+OBEYED = "\x1b[31m\x1b]0;title\x07\x00\x9b2J\u202e\u2066"
+"""A colour, a title, NUL, a control of one byte, and marks that turn what follows around."""
+
+
+def harmless(text: str) -> bool:
+    """Whether a terminal obeys nothing of it but the ends of its lines."""
+    return not any(c in text for c in OBEYED if not c.isprintable())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[bench]\nmotor = 'BAD'",
+        "[params]\n'BAD' = 1.0",
+        "BAD = 1.0",
+        "signal = [{ at_s = 0.0, rpm = 0.0, shape = 'BAD' }]",
+        "[[expect]]\nwindow = 'BAD'\nkey = 'faults'\nbelow = 1",
+        "[[window]]\nname = 'BAD'\nt0_s = 2.0\nt1_s = 1.0",
+    ],
+)
+def test_what_a_scenario_holds_does_not_command_the_terminal(tmp_path, text):
+    path = tmp_path / "scenario.toml"
+    # TOML takes them escaped, and as they are in a file that is none.
+    escaped = "".join(c if c.isascii() and c.isprintable() else f"\\u{ord(c):04x}" for c in OBEYED)
+    for bad in (escaped, OBEYED):
+        path.write_text(text.replace("'BAD'", f'"{bad}"').replace("BAD", f'"{bad}"'))
+        assert harmless(refused("scenario", path))
+
+
+def test_names_of_files_and_windows_do_not_command_the_terminal(tmp_path):
+    name = "\x1b[31m\u202e.csv"
+    assert harmless(refused("plot", tmp_path / name, "-o", tmp_path / "picture.svg"))
+    assert harmless(refused("scenario", tmp_path / name))
+    path = tmp_path / "scenario.toml"
+    path.write_text(
+        'bench.duration_s = 0.01\nwindow = [{ name = "\\u001b[31m", t0_s = 0.0, t1_s = 0.01 }]\n'
+        'expect = [{ window = "\\u001b[31m", key = "rpm_mean", below = 1.0 }]\n'
+    )
+    ended = run("scenario", path)
+    assert ended.returncode == 0 and "\\u{1b}[31m" in ended.stdout
+    assert harmless(ended.stdout)

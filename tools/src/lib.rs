@@ -41,6 +41,7 @@ use clap::error::ContextKind;
 use clap::error::ErrorKind::{DisplayHelpOnMissingArgumentOrSubcommand, UnknownArgument};
 use clap::parser::ValueSource;
 use clap::{Arg, CommandFactory, FromArgMatches};
+use siskin_scope::printable;
 
 use cli::{Cli, Command, KeyCommand};
 use error::Error;
@@ -56,7 +57,7 @@ pub fn main() -> ExitCode {
         Err(mut e) if e.use_stderr() && e.kind() != DisplayHelpOnMissingArgumentOrSubcommand => {
             // The most similar name may be that of another board. All of them are listed anyway.
             e.remove(ContextKind::SuggestedValue);
-            eprintln!("siskin: {}", one_line(&e.to_string()));
+            eprintln!("siskin: {}", printable::line(&one_line(&e.to_string())));
             return ExitCode::from(2);
         }
         // The help, which is also what no argument at all gets, or the version.
@@ -67,7 +68,7 @@ pub fn main() -> ExitCode {
         Err(e) => {
             let code = e.exit_code();
             if code != ExitCode::SUCCESS {
-                eprintln!("siskin: {e}");
+                eprintln!("siskin: {}", printable::lines(&e.to_string()));
             }
             code
         }

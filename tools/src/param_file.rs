@@ -8,6 +8,8 @@ use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::Path;
 
+use siskin_scope::printable;
+
 use crate::error::Error;
 use crate::params::{NAME_LENGTH, Param, is_name};
 
@@ -107,13 +109,13 @@ fn read_line(line: &str) -> Result<Option<(Option<u8>, Param)>, String> {
         [_, component, name, value, _] => {
             let id = component
                 .parse::<u8>()
-                .map_err(|_| format!("'{}' is not a component id", printable(component)))?;
+                .map_err(|_| format!("'{}' is not a component id", shown(component)))?;
             (Some(id), name, value)
         }
-        _ => return Err(format!("'{}' is not NAME VALUE", printable(line.trim()))),
+        _ => return Err(format!("'{}' is not NAME VALUE", shown(line.trim()))),
     };
     if !is_name(name) {
-        return Err(format!("'{}' is not a parameter name", printable(name)));
+        return Err(format!("'{}' is not a parameter name", shown(name)));
     }
     match value.parse::<f32>() {
         Ok(number) if number.is_finite() => Ok(Some((
@@ -123,16 +125,13 @@ fn read_line(line: &str) -> Result<Option<(Option<u8>, Param)>, String> {
                 value: number,
             },
         ))),
-        _ => Err(format!("'{}' is not a number for {name}", printable(value))),
+        _ => Err(format!("'{}' is not a number for {name}", shown(value))),
     }
 }
 
 /// Returns at most 40 characters, safe for a terminal.
-fn printable(text: &str) -> String {
-    text.chars()
-        .take(40)
-        .map(|c| if c.is_control() { '?' } else { c })
-        .collect()
+fn shown(text: &str) -> String {
+    printable::line(&text.chars().take(40).collect::<String>())
 }
 
 #[cfg(test)]

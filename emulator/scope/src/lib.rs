@@ -11,6 +11,7 @@ mod greeting;
 mod guard;
 mod head;
 mod hub;
+pub mod printable;
 mod recording;
 mod server;
 mod show;

@@ -2,6 +2,7 @@
 
 use plotters::style::{RGBColor, WHITE};
 use siskin_control::drive::Fault;
+use siskin_scope::printable;
 
 use super::chart::{Axis, Curve, CurveLook, Figure, Panel, Stretch};
 use super::phases::{fault_times, name, spans, tint};
@@ -166,7 +167,7 @@ fn title(recording: &Recording) -> String {
     let rate_khz = recording.periods as f64 / length_s / 1e3;
     let title = format!(
         "{}: {} s at {rate_khz:.1} kHz",
-        recording.name,
+        printable::line(&recording.name),
         number(length_s)
     );
     let bits = recording.faults.iter().fold(0, |all, bits| all | bits);

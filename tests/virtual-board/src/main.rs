@@ -52,10 +52,17 @@ struct Played {
     processor: Option<Figures>,
 }
 
+/// The program, as its complaints begin.
+const PROGRAM: &str = "siskin-vboard";
+
+fn complain(line: &str) {
+    options::complain(PROGRAM, line);
+}
+
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) => return options::usage("siskin-vboard", &error),
+        Err(error) => return options::usage(PROGRAM, &error),
     };
     let ended = match &cli.command {
         None => run(&cli),
@@ -64,7 +71,7 @@ fn main() -> ExitCode {
     match ended {
         Ok(status) => status,
         Err(line) => {
-            eprintln!("siskin-vboard: {line}");
+            complain(&line);
             ExitCode::from(2)
         }
     }
@@ -81,8 +88,7 @@ fn run(cli: &Cli) -> Result<ExitCode, String> {
     }
     let standing = args.standing().map_err(|error| line(&error))?;
     let (session, warning) = args.session(&standing).map_err(|error| line(&error))?;
-    let warn = |warning: &str| eprintln!("siskin-vboard: {warning}");
-    warning.as_deref().into_iter().for_each(warn);
+    warning.as_deref().into_iter().for_each(complain);
     let start = |starts: Vec<Start>| {
         let start = starts.into_iter().next().unwrap_or_default();
         let (board, warning) = VirtualBoard::new(&image, start)?;
@@ -92,7 +98,7 @@ fn run(cli: &Cli) -> Result<ExitCode, String> {
         let what = "image on a virtual board";
         report::opened(what, args, &standing, opened, board.params());
     };
-    let ended = live::run(session, start, opened, warn);
+    let ended = live::run(session, start, opened, complain);
     let (report, mut board) = ended.map_err(|error| line(&error))?;
     let processor = board.figures();
     let text = if args.common.json {

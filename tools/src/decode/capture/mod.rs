@@ -6,6 +6,8 @@ mod vcd;
 
 use std::io::BufRead;
 
+use siskin_scope::printable;
+
 use self::csv::Csv;
 use self::vcd::Vcd;
 
@@ -57,8 +59,7 @@ const SHOWN: usize = 40;
 /// Returns text from a file in a form that can be printed on one line.
 fn shown(text: &[u8]) -> String {
     let text = String::from_utf8_lossy(text);
-    let shown = |c: char| if c.is_control() { ' ' } else { c };
-    text.trim().chars().take(SHOWN).map(shown).collect()
+    printable::line(&text.trim().chars().take(SHOWN).collect::<String>())
 }
 
 impl<R: BufRead> Capture<R> {
