@@ -1,8 +1,10 @@
 """The page in a browser: it shows the ESC, drives it while held, and is closed to others."""
 
+import contextlib
 import csv
 import http.client
 import re
+import socket
 import time
 from xml.etree import ElementTree
 
@@ -10,7 +12,7 @@ import pytest
 
 from browser import TIMEOUT_S, Browser
 from dshot import HALF
-from emulator import run
+from emulator import free_port, run
 from scope import HOLD_RPM, browser, esc, look, play, port, spin  # noqa: F401  (fixtures)
 
 UPGRADE = {
@@ -171,6 +173,48 @@ def test_a_foreign_page_and_a_foreign_name_are_refused(esc, port):
         ("/socket", {"Host": f"rebound.example:{port}", "Origin": f"http://rebound.example:{port}", **UPGRADE}),
     ]:
         assert status(path, **headers) == 403, (path, headers)
+
+
+def test_slow_requests_do_not_keep_the_page_from_others(esc, port):
+    slow = [socket.create_connection(("127.0.0.1", port)) for _ in range(40)]
+    ended, until = set(), time.monotonic() + 4.0
+    while time.monotonic() < until:
+        for one in slow:
+            # A byte now and then, which is no reason to wait for long.
+            with contextlib.suppress(OSError):
+                one.send(b"G")
+                one.settimeout(0.001)
+                if one.recv(1) == b"":
+                    ended.add(one)
+        begun = time.monotonic()
+        page = http.client.HTTPConnection("127.0.0.1", port, timeout=1.0)
+        page.request("GET", "/scope.js")
+        assert page.getresponse().status == 200
+        page.close()
+        assert time.monotonic() - begun < 0.8
+        time.sleep(0.3)
+    for one in slow:
+        with contextlib.suppress(TimeoutError):
+            one.settimeout(0.001)
+            with contextlib.suppress(ConnectionError):
+                one.recv(1000)
+            ended.add(one)
+    assert len(ended) == 40
+
+
+def test_beyond_loopback_nothing_is_served_without_the_token(start, browser):
+    port = free_port()
+    emulator = start(web=f"0.0.0.0:{port}")
+    page = http.client.HTTPConnection("127.0.0.1", port, timeout=10.0)
+    for path in ("/", "/scope.js", "/parameters.json", "/uplot/uPlot.min.css"):
+        page.request("GET", path)
+        answer = page.getresponse()
+        assert answer.status == 403 and "token" in answer.read().decode(), path
+    url = re.search(r"http://0\.0\.0\.0:\d+/(\?token=[0-9a-f]+)", emulator.output())
+    browser.open(f"http://127.0.0.1:{port}/{url[1]}")
+    browser.wait("document.querySelector('#param-state').textContent.includes('parameters')")
+    assert browser.problems == []
+    browser.open("about:blank")
 
 
 def test_a_port_that_was_named_and_is_taken_is_an_error(esc, port):

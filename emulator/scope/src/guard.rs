@@ -2,14 +2,14 @@
 //!
 //! A browser sends requests to loopback for any page that asks it to. It tells in `Origin` for which, and in `Host`
 //! by which name it came here: a name that its owner has turned to this machine is not one of this machine's. Beyond
-//! loopback there are other people too, so there a token is wanted besides, which the first screen tells.
+//! loopback there are other people too, so there a token is wanted besides, which the first screen tells: it comes with
+//! the address of the page, and from then on as a cookie with whatever the page loads.
 
 use std::fmt::Write as _;
 use std::io;
 use std::net::{IpAddr, SocketAddr};
 
 use crate::head::Head;
-use crate::recording;
 
 /// Bytes of a token: too many to be tried.
 const TOKEN_BYTES: usize = 16;
@@ -67,14 +67,30 @@ impl Guard {
             }
             _ => {}
         }
-        let is_own = head.path == "/" || recording::is_one(&head.path);
-        let is_open = !is_own && head.websocket_key.is_none();
         match &self.token {
-            Some(token) if !is_open && !same(token, head.token()) => {
+            Some(token)
+                if !same(token, head.token()) && !same(token, head.cookie(&self.name())) =>
+            {
                 Err("the token is missing or wrong: open the address that the program has printed")
             }
             _ => Ok(()),
         }
+    }
+
+    /// A line of the answer to a request that brings the token in its address: the browser keeps it for this port.
+    pub(crate) fn cookie(&self, head: &Head) -> String {
+        match &self.token {
+            Some(token) if !head.token().is_empty() => {
+                let name = self.name();
+                format!("Set-Cookie: {name}={token}; Path=/; HttpOnly; SameSite=Strict\r\n")
+            }
+            _ => String::new(),
+        }
+    }
+
+    /// The cookie's name: a browser gives a host's cookies to all of its ports.
+    fn name(&self) -> String {
+        format!("siskin-{}", self.local.port())
     }
 
     /// Whether a `Host` is a name of this machine that nobody else can turn to it.
@@ -169,10 +185,6 @@ mod tests {
         assert_eq!(token.len(), 2 * TOKEN_BYTES);
         let host = "Host: 192.168.1.2:8080\r\n";
         let socket = format!("{host}Origin: http://192.168.1.2:8080\r\n{SOCKET}");
-        assert!(
-            admits(&guard, "/scope.js", host),
-            "nothing of the ESC's is in it"
-        );
         for (query, is_right) in [
             (format!("?token={token}"), true),
             (format!("?token={token}0"), false),
@@ -188,10 +200,17 @@ mod tests {
                 admits(&guard, &format!("/socket{query}"), &socket),
                 is_right
             );
-            assert_eq!(
-                admits(&guard, &format!("/recording/0{query}"), host),
-                is_right
-            );
+            for path in ["/recording/0", "/scope.js", "/parameters.json"] {
+                assert_eq!(admits(&guard, &format!("{path}{query}"), host), is_right);
+            }
+        }
+        let opened = head(&format!("GET /?token={token} HTTP/1.1\r\n{host}\r\n"));
+        let cookie =
+            format!("Set-Cookie: siskin-8080={token}; Path=/; HttpOnly; SameSite=Strict\r\n");
+        assert_eq!(guard.cookie(&opened), cookie);
+        for (name, is_right) in [("siskin-8080", true), ("siskin-8081", false)] {
+            let host = format!("{host}Cookie: a=b; {name}={token}\r\n");
+            assert_eq!(admits(&guard, "/scope.js", &host), is_right, "{name}");
         }
         assert!(!admits(
             &guard,

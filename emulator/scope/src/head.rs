@@ -13,8 +13,8 @@ const MAX_BYTES: usize = 8192;
 /// The most lines in it.
 const MAX_HEADERS: usize = 64;
 
-/// In this time a head must be there.
-const DEADLINE: Duration = Duration::from_secs(5);
+/// In this time a head must be there, however it trickles in: a browser sends it in one piece.
+const DEADLINE: Duration = Duration::from_secs(2);
 
 /// What a request asks for, and who asks.
 #[derive(Debug, PartialEq, Eq)]
@@ -25,28 +25,34 @@ pub(crate) struct Head {
     pub(crate) origin: Option<String>,
     /// Of a request for a WebSocket.
     pub(crate) websocket_key: Option<String>,
+    cookie: Option<String>,
     /// Its length.
     bytes: usize,
 }
 
 impl Head {
-    /// Reads a head; what has been read behind it comes with it.
+    /// Reads a head; what has been read behind it comes with it. One read may take up to `stuck`.
     ///
     /// # Errors
     /// It is none, or does not come in time.
-    pub(crate) fn read(stream: &mut TcpStream) -> io::Result<(Self, Vec<u8>)> {
+    pub(crate) fn read(stream: &mut TcpStream, stuck: Duration) -> io::Result<(Self, Vec<u8>)> {
         let wrong = |what| io::Error::new(io::ErrorKind::InvalidData, what);
         let begun = Instant::now();
         let mut bytes = Vec::new();
         let mut buffer = [0; 1024];
         loop {
+            let left = DEADLINE.saturating_sub(begun.elapsed());
+            if left.is_zero() {
+                return Err(wrong("the head of the request has not come in time"));
+            }
+            stream.set_read_timeout(Some(stuck.min(left)))?;
             let count = stream.read(&mut buffer)?;
             bytes.extend_from_slice(&buffer[..count]);
             if let Some(head) = Self::parse(&bytes).map_err(wrong)? {
                 let rest = bytes.split_off(head.bytes);
                 return Ok((head, rest));
             }
-            if count == 0 || bytes.len() > MAX_BYTES || begun.elapsed() > DEADLINE {
+            if count == 0 || bytes.len() > MAX_BYTES {
                 return Err(wrong("the head of the request is not whole"));
             }
         }
@@ -75,6 +81,7 @@ impl Head {
             host: None,
             origin: None,
             websocket_key: None,
+            cookie: None,
             bytes,
         };
         for header in &*request.headers {
@@ -82,6 +89,7 @@ impl Head {
                 "host" => &mut head.host,
                 "origin" => &mut head.origin,
                 "sec-websocket-key" => &mut head.websocket_key,
+                "cookie" => &mut head.cookie,
                 _ => continue,
             };
             let value = std::str::from_utf8(header.value).map_err(|_| "a header is no text")?;
@@ -92,12 +100,23 @@ impl Head {
         Ok(Some(head))
     }
 
-    /// The token that came along, or nothing.
+    /// The token that came along in the address, or nothing.
     pub(crate) fn token(&self) -> &str {
-        let fields = self.query.split('&');
-        let mut tokens = fields.filter_map(|field| field.strip_prefix("token="));
-        tokens.next().unwrap_or_default()
+        field(self.query.split('&'), "token")
     }
+
+    /// A cookie, or nothing.
+    pub(crate) fn cookie(&self, name: &str) -> &str {
+        let cookies = self.cookie.as_deref().unwrap_or_default();
+        field(cookies.split(';').map(str::trim), name)
+    }
+}
+
+/// The first value of a name, or nothing.
+fn field<'a>(fields: impl Iterator<Item = &'a str>, name: &str) -> &'a str {
+    let mut pairs = fields.filter_map(|field| field.split_once('='));
+    let found = pairs.find(|(key, _)| *key == name);
+    found.map(|(_, value)| value).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -106,10 +125,14 @@ mod tests {
 
     #[test]
     fn a_head_is_taken_when_it_is_whole_and_only_if_it_is_plain() {
-        let whole = b"GET /a?x=1&token=t HTTP/1.1\r\nHost: h:1\r\nOrigin: http://h:1\r\n\r\n";
+        let whole = b"GET /a?x=1&token=t HTTP/1.1\r\nHost: h:1\r\nOrigin: http://h:1\r\nCookie: a=b; c=d\r\n\r\n";
         let head = Head::parse(whole).unwrap().unwrap();
         assert_eq!((head.path.as_str(), head.token()), ("/a", "t"));
         assert_eq!(head.host.as_deref(), Some("h:1"));
+        assert_eq!(
+            ["a", "c", "d"].map(|name| head.cookie(name)),
+            ["b", "d", ""]
+        );
         assert_eq!(head.bytes, whole.len());
         for length in 0..whole.len() {
             assert_eq!(Head::parse(&whole[..length]), Ok(None), "{length}");

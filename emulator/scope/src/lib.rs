@@ -17,6 +17,7 @@ mod server;
 mod show;
 mod site;
 mod viewer;
+mod waiting;
 
 pub use address::{AddressError, HostPort};
 pub use greeting::greeting;

@@ -16,11 +16,6 @@ pub(crate) fn named<'a>(recordings: &'a [PathBuf], path: &str) -> Option<&'a Pat
     recordings.get(number).map(PathBuf::as_path)
 }
 
-/// Whether a path of the site is a recording's, if there is such a one.
-pub(crate) fn is_one(path: &str) -> bool {
-    path.starts_with(PLACE)
-}
-
 /// What has been recorded so far, and its length: of a text whole lines.
 ///
 /// # Errors

@@ -17,8 +17,9 @@ use crate::hub::Hub;
 use crate::recording;
 use crate::show::Show;
 use crate::viewer;
+use crate::waiting::Waiting;
 
-/// Connections at a time; more are closed at once.
+/// Connections at a time; of more, those that have not asked for anything yet are closed.
 const MAX_CONNECTIONS: usize = 32;
 
 /// A peer that does not read or write for so long is dropped.
@@ -47,32 +48,41 @@ pub(crate) struct Server<S: Show> {
 /// Serves from now on, until the program ends.
 pub(crate) fn serve<S: Show>(listener: TcpListener, server: Server<S>) {
     let (server, open) = (Arc::new(server), Arc::new(AtomicUsize::new(0)));
+    let waiting = Arc::new(Waiting::default());
     thread::spawn(move || {
-        for stream in listener.incoming() {
-            let Ok(stream) = stream else {
+        for (number, stream) in (0..).zip(listener.incoming()) {
+            let stream = stream.and_then(|stream| Ok((stream.try_clone()?, stream)));
+            let Ok((own, mut stream)) = stream else {
                 // Too many open files, say: others may close some.
                 thread::sleep(STUCK);
                 continue;
             };
-            if open.fetch_add(1, Ordering::Relaxed) >= MAX_CONNECTIONS {
-                open.fetch_sub(1, Ordering::Relaxed);
+            if open.load(Ordering::Relaxed) >= MAX_CONNECTIONS && !waiting.end_oldest() {
                 continue;
             }
+            open.fetch_add(1, Ordering::Relaxed);
+            waiting.add(number, own);
             let (server, open) = (Arc::clone(&server), Arc::clone(&open));
+            let waiting = Arc::clone(&waiting);
             thread::spawn(move || {
+                let read = Head::read(&mut stream, STUCK);
+                waiting.remove(number);
                 // A peer that is gone hears no reason.
-                let _ = answer(stream, &server);
+                let _ = answer(stream, read, &server);
                 open.fetch_sub(1, Ordering::Relaxed);
             });
         }
     });
 }
 
-fn answer<S: Show>(mut stream: TcpStream, server: &Server<S>) -> io::Result<()> {
+fn answer<S: Show>(
+    mut stream: TcpStream,
+    read: io::Result<(Head, Vec<u8>)>,
+    server: &Server<S>,
+) -> io::Result<()> {
     stream.set_nodelay(true)?;
-    stream.set_read_timeout(Some(STUCK))?;
     stream.set_write_timeout(Some(STUCK))?;
-    let (head, rest) = match Head::read(&mut stream) {
+    let (head, rest) = match read {
         Ok(read) => read,
         Err(error) if error.kind() == io::ErrorKind::InvalidData => {
             return reply(&mut stream, "400 Bad Request", &error.to_string());
@@ -109,33 +119,37 @@ fn answer<S: Show>(mut stream: TcpStream, server: &Server<S>) -> io::Result<()> 
         let Ok((mut file, length)) = recording::open(path) else {
             return reply(&mut stream, "404 Not Found", "it cannot be read any more");
         };
-        begin(&mut stream, "200 OK", "application/octet-stream", length)?;
+        let kind = "application/octet-stream";
+        begin(&mut stream, "200 OK", kind, length, "")?;
         return io::copy(&mut file, &mut stream).map(drop);
     }
     match assets::find(&head.path) {
-        Some((kind, content)) => send(&mut stream, "200 OK", kind, content),
+        Some((kind, content)) => {
+            let cookie = server.guard.cookie(&head);
+            begin(&mut stream, "200 OK", kind, content.len() as u64, &cookie)?;
+            stream.write_all(content.as_bytes())
+        }
         None => reply(&mut stream, "404 Not Found", "there is no such file"),
     }
 }
 
 fn reply(stream: &mut TcpStream, status: &str, line: &str) -> io::Result<()> {
-    send(
-        stream,
-        status,
-        "text/plain; charset=utf-8",
-        &format!("{line}\n"),
-    )
-}
-
-fn send(stream: &mut TcpStream, status: &str, kind: &str, content: &str) -> io::Result<()> {
-    begin(stream, status, kind, content.len() as u64)?;
+    let content = format!("{line}\n");
+    let kind = "text/plain; charset=utf-8";
+    begin(stream, status, kind, content.len() as u64, "")?;
     stream.write_all(content.as_bytes())
 }
 
-/// All that stands before the content.
-fn begin(stream: &mut TcpStream, status: &str, kind: &str, length: u64) -> io::Result<()> {
+/// All that stands before the content, with lines of its own.
+fn begin(
+    stream: &mut TcpStream,
+    status: &str,
+    kind: &str,
+    length: u64,
+    own: &str,
+) -> io::Result<()> {
     let head = format!(
-        "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n{HEADERS}\r\n"
+        "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n{HEADERS}{own}\r\n"
     );
     stream.write_all(head.as_bytes())
 }
