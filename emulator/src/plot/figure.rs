@@ -17,6 +17,9 @@ pub(super) const COLUMNS: usize = 900;
 /// Size of a panel.
 const PANEL: (u32, u32) = (2400, 530);
 
+/// How far within the end of an axis the mark of what is beyond it stands, as a share of the axis.
+const RIM: f64 = 0.02;
+
 /// Quantities of a recording on a panel: the least height of its axes, in the unit, since less is noise that would fill
 /// the panel, and the share of the columns at either end that may exceed them.
 struct Shown<'a> {
@@ -107,7 +110,13 @@ impl Shown<'_> {
             range: Some(self.range()),
             ..Axis::new(self.axis)
         };
-        let curves = self.curves.into_iter().map(|(curve, _)| curve).collect();
+        let meaning = self
+            .curves
+            .iter()
+            .any(|(curve, _)| !curve.spread.is_empty());
+        let more = [self.beyond(recording), meaning.then(meaning_of_bands)];
+        let curves = self.curves.into_iter().map(|(curve, _)| curve);
+        let curves = curves.chain(more.into_iter().flatten()).collect();
         let stretches = spans(recording).into_iter().map(|span| Stretch {
             name: if first { name(span.phase) } else { "" },
             ends: (span.t0_s, span.t1_s),
@@ -118,6 +127,36 @@ impl Shown<'_> {
             faults: fault_times(recording),
             ..Panel::new(self.title, time, values, curves)
         }
+    }
+
+    /// Returns marks at the end of the value axis for the columns that reach beyond it, if there are any.
+    fn beyond(&self, recording: &Recording) -> Option<Curve> {
+        let (low, high) = self.range();
+        let rim = RIM * (high - low);
+        let mut furthest = 0.0_f64;
+        let mut points = Vec::new();
+        for (_, trace) in self.curves.iter().filter(|_| self.outliers > 0.0) {
+            for (column, cell) in trace.cells().iter().enumerate() {
+                let Some(cell) = cell else { continue };
+                for (value, is_beyond, end) in [
+                    (cell.min, cell.min < low, low + rim),
+                    (cell.max, cell.max > high, high - rim),
+                ] {
+                    if is_beyond {
+                        points.push((recording.time_s(column), end));
+                        if value.abs() > furthest.abs() {
+                            furthest = value;
+                        }
+                    }
+                }
+            }
+        }
+        let name = format!("beyond the axis, to {}", number(furthest.round()));
+        let dots = (!points.is_empty()).then(|| Curve::dots(name, points));
+        dots.map(|dots| Curve {
+            colour: Some(VERMILION),
+            ..dots
+        })
     }
 
     /// Returns the range of the value axis: all curves, with some room.
@@ -135,6 +174,15 @@ impl Shown<'_> {
         let span = (high - low).max(self.least_span);
         let middle = (low + high) / 2.0;
         (middle - 0.55 * span, middle + 0.55 * span)
+    }
+}
+
+/// Returns an entry of the legend alone.
+fn meaning_of_bands() -> Curve {
+    Curve {
+        look: CurveLook::Band,
+        colour: Some(GREY),
+        ..Curve::line("band: least to greatest, line: mean", [])
     }
 }
 

@@ -72,12 +72,54 @@ fn a_picture_says_what_it_shows() {
         "Brake",
         "0.04",
         "1000",
+        "band: least to greatest, line: mean",
     ] {
         assert!(
             texts.iter().any(|text| text == expected),
             "no {expected} in {texts:?}"
         );
     }
+}
+
+#[test]
+fn what_is_beyond_an_axis_is_marked() {
+    let folder = tempfile::tempdir().unwrap();
+    let (record, picture) = (folder.path().join("a.csv"), folder.path().join("a.svg"));
+    let texts = || {
+        plot(&record, &picture).unwrap();
+        let text = std::fs::read_to_string(&picture).unwrap();
+        let document = roxmltree::Document::parse(&text).unwrap();
+        let nodes = document.descendants();
+        let texts = nodes.filter(|node| node.has_tag_name("text"));
+        let texts = texts.map(|node| node.text().unwrap_or_default().trim().to_owned());
+        (
+            texts.collect::<Vec<_>>(),
+            document
+                .descendants()
+                .filter(|node| node.has_tag_name("circle"))
+                .count(),
+        )
+    };
+    recording(&record, 2400, 0.0);
+    let (before, dots) = texts();
+    assert!(!before.iter().any(|text| text.starts_with("beyond")));
+    assert_eq!(dots, 0);
+    // One period in which the estimate is far off.
+    let column = Row::COLUMNS
+        .iter()
+        .position(|name| *name == "angle_error_deg");
+    let text = std::fs::read_to_string(&record).unwrap();
+    let mut lines: Vec<_> = text.lines().map(str::to_owned).collect();
+    let mut cells: Vec<_> = lines[1000].split(',').collect();
+    cells[column.unwrap()] = "-170.2";
+    lines[1000] = cells.join(",");
+    std::fs::write(&record, lines.join("\n")).unwrap();
+    let (after, dots) = texts();
+    assert!(
+        after.iter().any(|text| text == "beyond the axis, to -170"),
+        "{after:?}"
+    );
+    assert_eq!(dots, 2, "its mark, and that of the legend");
 }
 
 #[test]

@@ -252,7 +252,12 @@ fn sample<B: DrawingBackend>(
     };
     let (line, full) = (curve.width as i32, colour.mix(1.0));
     match curve.look {
-        CurveLook::Line => dash(0, SAMPLE, line, full),
+        CurveLook::Line => {
+            if !curve.spread.is_empty() {
+                dash(0, SAMPLE, 18, colour.mix(0.3))?;
+            }
+            dash(0, SAMPLE, line, full)
+        }
         CurveLook::Dashed => {
             dash(0, DASH.0, line, full)?;
             dash(DASH.0 + DASH.1, SAMPLE, line, full)
