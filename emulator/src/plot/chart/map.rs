@@ -15,9 +15,11 @@ use crate::plot::style::{AXIS, text};
 /// shape.
 const STEPS: usize = 24;
 /// Right of the axes: the space, the bar, its numbers and its name.
-pub(super) const WIDTH: u32 = 210;
+pub(super) const WIDTH: u32 = 240;
 const SPACE: i32 = 24;
 const BAR: i32 = 34;
+/// Right of its name, so that it does not touch what stands beside the panel.
+const AFTER: i32 = 40;
 /// Least distance between the numbers.
 const NUMBER: f64 = 48.0;
 
@@ -115,7 +117,11 @@ impl Map {
         let name = text(28.0)
             .transform(FontTransform::Rotate270)
             .pos(Pos::new(HPos::Center, VPos::Bottom));
-        area.draw_text(&self.label, &name, (width as i32 - 10, (top + bottom) / 2))
+        area.draw_text(
+            &self.label,
+            &name,
+            (width as i32 - AFTER, (top + bottom) / 2),
+        )
     }
 }
 
