@@ -56,6 +56,9 @@ pub(super) fn item(
     }
 }
 
+/// The longest line of a table.
+const LINE: usize = 110;
+
 impl fmt::Display for Reproduction {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let width = self.items.iter().map(|item| item.name.len()).max();
@@ -63,49 +66,71 @@ impl fmt::Display for Reproduction {
         let show = |value: Option<f64>| {
             value.map_or_else(|| "-".to_owned(), |value| format!("{value:.2}"))
         };
+        let reasons = self.reasons();
         writeln!(
             f,
-            "{:width$} {:>9} {:>9}      {:7} {:20}",
-            "", "paper", "measured", "", "agrees from, to"
+            "{:width$} {:>9} {:>9}      {:11} agrees from, to",
+            "", "paper", "measured", ""
         )?;
-        for item in &self.items {
-            let verdict = match item.comparison.verdict {
-                Verdict::Agrees => "agrees",
-                Verdict::Differs => "DIFFERS",
-                Verdict::Open => "-",
-            };
-            let bound = item.comparison.bound;
-            let bound = bound.map(|[low, high]| format!("{low:.2} {high:.2}"));
-            writeln!(
-                f,
-                "{:width$} {:>9} {:>9} {:4} {verdict:7} {:20} {}",
-                item.name,
-                show(item.paper),
-                show(item.measured),
-                item.unit,
-                bound.unwrap_or_default(),
-                item.note
-            )?;
+        for rows in self.items.chunk_by(|a, b| a.note == b.note) {
+            for item in rows {
+                let reason = |of| reasons.iter().position(|reason| *reason == of);
+                let verdict = match item.comparison.verdict {
+                    Verdict::Agrees => "agrees".to_owned(),
+                    Verdict::Differs => {
+                        let number = reason(item.comparison.reason).unwrap_or_default() + 1;
+                        format!("DIFFERS [{number}]")
+                    }
+                    Verdict::Open => "-".to_owned(),
+                };
+                let bound = item.comparison.bound;
+                let bound = bound.map(|[low, high]| format!("{low:.2} {high:.2}"));
+                let row = format!(
+                    "{:width$} {:>9} {:>9} {:4} {verdict:11} {}",
+                    item.name,
+                    show(item.paper),
+                    show(item.measured),
+                    item.unit,
+                    bound.unwrap_or_default(),
+                );
+                writeln!(f, "{}", row.trim_end())?;
+            }
+            write_wrapped(f, "", &rows[0].note)?;
         }
-        self.differences(f)
+        for (index, reason) in reasons.iter().enumerate() {
+            writeln!(f)?;
+            write_wrapped(f, &format!("[{}]", index + 1), reason)?;
+        }
+        Ok(())
     }
 }
 
 impl Reproduction {
-    /// Prints the reason for the bound of each item that misses it: items of one kind share a
-    /// reason.
-    fn differences(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let differs = |item: &&Item| item.comparison.verdict == Verdict::Differs;
-        let differing: Vec<&Item> = self.items.iter().filter(differs).collect();
-        let of_reason = |a: &&Item, b: &&Item| a.comparison.reason == b.comparison.reason;
-        for kind in differing.chunk_by(of_reason) {
-            let names: Vec<_> = kind.iter().map(|item| item.name.as_str()).collect();
-            let reasons = kind.first().map(|item| item.comparison.reason);
-            let reason = reasons.unwrap_or_default();
-            writeln!(f, "\ndiffering: {}: {reason}", names.join(", "))?;
+    /// Returns the reasons for the bounds of the items that miss them, each once.
+    fn reasons(&self) -> Vec<&'static str> {
+        let mut reasons = Vec::new();
+        for Item { comparison, .. } in &self.items {
+            if comparison.verdict == Verdict::Differs && !reasons.contains(&comparison.reason) {
+                reasons.push(comparison.reason);
+            }
         }
-        Ok(())
+        reasons
     }
+}
+
+/// Writes a text on lines of bounded length, indented, with a mark before the first.
+fn write_wrapped(f: &mut fmt::Formatter, mark: &str, text: &str) -> fmt::Result {
+    let mut line = format!("{mark:4}");
+    for word in text.split_whitespace() {
+        if line.chars().count() + 1 + word.chars().count() > LINE {
+            writeln!(f, "{}", line.trim_end())?;
+            line = format!("{:4}", "");
+        } else if line.chars().count() > 4 {
+            line.push(' ');
+        }
+        line.push_str(word);
+    }
+    writeln!(f, "{}", line.trim_end())
 }
 
 #[cfg(test)]
@@ -137,17 +162,21 @@ mod tests {
         };
         let text = reproduction.to_string();
         let lines: Vec<&str> = text.lines().collect();
-        assert!(lines[1].contains("-1.12 pt   DIFFERS 0.20 0.60"), "{text}");
         assert!(
-            lines[3].contains("30.35 %    agrees  29.43 35.97"),
+            lines[1].contains("-1.12 pt   DIFFERS [1] 0.20 0.60"),
             "{text}"
         );
-        assert!(lines[4].contains("0.29 deg  -  "), "{text}");
-        let [reason] = lines[6..] else {
-            panic!("{text}")
-        };
-        let names =
-            "differing: fig7_efficiency_diff_3000, fig7_efficiency_diff_4500: an experiment";
-        assert!(reason.starts_with(names), "{text}");
+        assert!(lines[2].contains("0.19 pt   DIFFERS [1] "), "{text}");
+        assert_eq!(lines[3], "    figure 7(c)", "once for both rows above");
+        assert!(
+            lines[4].contains("30.35 %    agrees      29.43 35.97"),
+            "{text}"
+        );
+        assert!(lines[6].ends_with("0.29 deg  -"), "{text}");
+        assert!(lines[9].starts_with("[1] an experiment"), "{text}");
+        assert!(
+            lines.iter().all(|line| line.chars().count() <= LINE),
+            "{text}"
+        );
     }
 }
