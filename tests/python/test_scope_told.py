@@ -110,11 +110,12 @@ def test_with_a_fault_nothing_looks_well_and_no_faded_estimate_is_a_speed(browse
     # The shorted winding brakes the shaft within a fifth of a second, the estimate fades for seconds.
     esc.next("ESC_STATUS", lambda m: m.rpm[0] < 1500)
     assert esc.status().rpm[0] > 300
-    assert browser.text("#tile-rpm + span") == "True speed, rpm"
+    assert browser.text("#tile-rpm + span") == "True rpm"
     assert abs(int(browser.text("#tile-rpm"))) < 150
     # A piece of the past does not tell what holds now.
     browser.click("#pause")
-    browser.wait("document.querySelector('#tile-rpm + span').textContent === 'Speed, bridge off'")
+    browser.wait("document.querySelector('#tile-rpm + span').textContent === 'Speed unknown'")
+    assert browser.text("#tile-faults") == "over-current"
     browser.click("#mend")
     browser.click("#stop")
     browser.wait("document.querySelector('#tile-faults').textContent === 'none'")

@@ -205,6 +205,7 @@ function choose(i) {
   link.esc = i;
   offer();
   if (hello.simulated) link.ask({ standing: { esc: i } });
+  tiles.unknown();
   samples.clear();
   traces.live();
   parameters.read();

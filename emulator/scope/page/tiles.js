@@ -15,6 +15,7 @@ const digits = (value, count) => value.toFixed(count).replace(/^-(0(\.0*)?)$/, "
 export class Tiles {
   constructor(place) {
     this.tiles = {};
+    this.faults = [];
     for (const [name, label] of NAMES) {
       const tile = document.createElement("div");
       tile.className = WIDE.includes(name) ? "tile wide" : "tile";
@@ -34,7 +35,7 @@ export class Tiles {
   unknown() {
     for (const name of Object.keys(this.tiles)) this.set(name, "–");
     this.tiles.faults.parentElement.classList.remove("bad");
-    Object.assign(this, { estimate: null, truth: null, told: null, known: null });
+    Object.assign(this, { estimate: null, truth: null, faults: [] });
   }
 
   set(name, text) {
@@ -56,16 +57,14 @@ export class Tiles {
   /** What the heartbeat tells. */
   conditions(faults, limits) {
     this.set("limits", limits.join(", ") || "none");
-    this.told = faults;
-    this.showFaults();
+    this.showFaults(faults);
   }
 
   /** What the traces tell: the faults as they come, the true speed where `isLatest`, and power into the shaft against
    * that from the supply. */
   traces({ values }, faults, isLatest) {
-    this.known = faults;
     this.truth = this.isSimulated && isLatest ? values.rpm?.at(-1) : null;
-    this.showFaults();
+    this.showFaults(faults);
     const mean = (list) => list.reduce((sum, value) => sum + value, 0) / list.length;
     if (!values.torque_nm) return;
     const [torque, rpm, volts, amps] = ["torque_nm", "rpm", "bus_v", "bus_a"].map((name) => mean(values[name]));
@@ -80,23 +79,20 @@ export class Tiles {
     this.tiles.efficiency.parentElement.hidden = !isSimulated;
   }
 
-  get faults() {
-    return this.known ?? this.told ?? [];
-  }
-
   /** The estimate, but with a fault: then the bridge is off, and the estimate only fades. */
   showSpeed() {
     const isFaulty = this.faults.length > 0;
     this.set("rpm", isFaulty ? (this.truth?.toFixed(0).replace(/^-0$/, "0") ?? "–") : (this.estimate ?? "–"));
-    const label = !isFaulty ? "Speed, rpm" : this.truth == null ? "Speed, bridge off" : "True speed, rpm";
+    const label = !isFaulty ? "Speed, rpm" : this.truth == null ? "Speed unknown" : "True rpm";
     const { nextSibling } = this.tiles.rpm;
     if (nextSibling.textContent !== label) nextSibling.textContent = label;
   }
 
-  showFaults() {
-    const { faults } = this;
+  /** Those that were told last, by whatever told them; null is no news. */
+  showFaults(faults) {
+    this.faults = faults ?? this.faults;
     this.showSpeed();
-    this.set("faults", faults.length ? faults.join(", ") : "none");
-    this.tiles.faults.parentElement.classList.toggle("bad", faults.length > 0);
+    this.set("faults", this.faults.join(", ") || "none");
+    this.tiles.faults.parentElement.classList.toggle("bad", this.faults.length > 0);
   }
 }
