@@ -260,7 +260,7 @@ pub(crate) struct ImageArgs {
     #[arg(long)]
     pub(crate) board: Option<Board>,
     /// Parts of the drive, where the board has no room for all: 'flight' (without it), 'papers', or a list such as
-    /// 'flight,hall'.
+    /// 'identification,record,hall'.
     #[arg(long, value_name = "LIST", requires = "board", conflicts_with = "elf")]
     pub(crate) parts: Option<Parts>,
     /// Folder for the files.

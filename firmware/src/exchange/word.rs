@@ -52,7 +52,7 @@ pub fn unpack(word: u32) -> Setpoint {
         TEST => Setpoint::Test(Current::from_bits(bits)),
         TONE => Setpoint::Tone(Speed::from_bits(bits)),
         PULL => Setpoint::Pull(Pull::from_number(word as u8)),
-        EXCITE => Setpoint::Excite(Excitation::from_word(word)),
+        EXCITE => Excitation::from_word(word).map_or(Setpoint::Stop, Setpoint::Excite),
         VOLTAGE => Setpoint::Voltage(I1F31::from_bits(bits)),
         _ => rest(word & VALUE_MASK),
     }
@@ -72,6 +72,7 @@ mod tests {
     use siskin_control::drive::Ripple;
 
     use super::*;
+    use siskin_control::parts::Identification;
 
     #[test]
     fn every_setpoint_comes_back_within_the_value_s_step() {
@@ -88,7 +89,9 @@ mod tests {
         all.extend(Pull::ALL.map(Setpoint::Pull));
         for (phase, ripple) in [(0, Ripple::None), (1, Ripple::Along), (2, Ripple::Across)] {
             let current = Current::from_num(0.375);
-            all.push(Setpoint::Excite(Excitation::new(phase, current, ripple)));
+            let part = Identification::get();
+            let excitation = part.map(|part| Excitation::new(part, phase, current, ripple));
+            all.extend(excitation.map(Setpoint::Excite));
         }
         all.extend(Fault::ALL.map(Setpoint::Fault));
         for setpoint in all {

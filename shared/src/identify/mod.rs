@@ -27,6 +27,7 @@ pub use report::{Figure, Line, Report};
 use crate::drive::{Excitation, Phase, Ripple, Setpoint, Snapshot};
 use crate::params::choice::CtlDrive;
 use crate::params::{Choice, Kind, ParamId, Params};
+use crate::parts::Identification;
 use crate::units::{Scale, Speed};
 use means::{EXCITED_POLLS, Means, OperatingPoint, SPUN_POLLS, seconds};
 use report::Motor;
@@ -77,8 +78,6 @@ const LONGEST_S: f32 = 8.0;
 /// The step of an identification.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
-    /// None is under way.
-    Over,
     /// The drive forgets the motor.
     Reset,
     /// An excitation, by number: four of each phase.
@@ -132,7 +131,8 @@ impl Inputs<'_> {
 /// An identification and its results.
 #[derive(Clone, Debug)]
 pub struct Identify {
-    step: Step,
+    /// `None` while none is under way.
+    step: Option<(Identification, Step)>,
     since_us: u64,
     setpoint: Setpoint,
     means: Means,
@@ -152,7 +152,7 @@ pub struct Identify {
 impl Default for Identify {
     fn default() -> Self {
         Self {
-            step: Step::Over,
+            step: None,
             since_us: 0,
             setpoint: Setpoint::Stop,
             means: Means::default(),
@@ -170,21 +170,22 @@ impl Default for Identify {
 impl Identify {
     /// Begins an identification.
     pub fn begin(&mut self, now_us: u64) -> Outcome {
+        let Some(part) = Identification::get() else {
+            return Outcome::Done(Err("not in this image"));
+        };
         *self = Self::default();
-        self.enter(now_us, Step::Reset, Setpoint::Stop);
+        self.enter(now_us, (part, Step::Reset), Setpoint::Stop);
         Outcome::Assume
     }
 
     /// Ends the one under way, if any, for this reason.
     pub fn end(&mut self, reason: &'static str) -> Option<Outcome> {
-        let ended = self.is_under_way();
-        self.step = Step::Over;
-        ended.then_some(Outcome::Done(Err(reason)))
+        (self.step.take()).map(|_| Outcome::Done(Err(reason)))
     }
 
     /// Returns true while one is under way.
     pub fn is_under_way(&self) -> bool {
-        self.step != Step::Over
+        self.step.is_some()
     }
 
     /// Returns the drive's set-point while one is under way.
@@ -196,6 +197,7 @@ impl Identify {
     // Out of line: its stack is free for what the caller does next.
     #[inline(never)]
     pub fn poll(&mut self, inputs: &Inputs) -> Option<Outcome> {
+        let step = self.step?;
         let passed_s = seconds(inputs.now_us, self.since_us);
         let result = if !inputs.rests {
             Err("the throttle is open")
@@ -204,26 +206,32 @@ impl Identify {
         } else if passed_s > LONGEST_S {
             Err("it does not turn properly")
         } else {
-            self.advance(inputs, passed_s)
+            self.advance(inputs, step, passed_s)
         };
         result.unwrap_or_else(|reason| self.end(reason))
     }
 
-    fn advance(&mut self, inputs: &Inputs, passed_s: f32) -> Result<Option<Outcome>, &'static str> {
-        match self.step {
-            Step::Reset if passed_s > ADOPTED_S => Ok(Some(self.excite(inputs, 0))),
+    fn advance(
+        &mut self,
+        inputs: &Inputs,
+        (part, step): (Identification, Step),
+        passed_s: f32,
+    ) -> Result<Option<Outcome>, &'static str> {
+        match step {
+            Step::Reset if passed_s > ADOPTED_S => Ok(Some(self.excite(inputs, part, 0))),
             Step::Rebuild if passed_s > ADOPTED_S => {
-                self.enter(inputs.now_us, Step::Up, self.torque(inputs, 1.0));
+                self.enter(inputs.now_us, (part, Step::Up), self.torque(inputs, 1.0));
                 Ok(Some(Outcome::Progress(80)))
             }
-            Step::Over | Step::Reset | Step::Rebuild => Ok(None),
-            Step::Excite(number) => self.measure_excitation(inputs, number, passed_s),
-            Step::Spin => Ok(self.measure_spin(inputs)),
-            Step::Release => Ok(self.await_release(inputs, passed_s)),
-            Step::Up | Step::Down => self.measure_run(inputs),
+            Step::Reset | Step::Rebuild => Ok(None),
+            Step::Excite(number) => self.measure_excitation(inputs, part, number, passed_s),
+            Step::Spin => Ok(self.measure_spin(inputs, part)),
+            Step::Release => Ok(self.await_release(inputs, part, passed_s)),
+            Step::Up => self.measure_run(inputs, part, false),
+            Step::Down => self.measure_run(inputs, part, true),
             Step::Halt if inputs.snapshot.phase == Phase::Run => Ok(None),
             Step::Halt => {
-                self.step = Step::Over;
+                self.step = None;
                 Ok(Some(Outcome::Done(Ok(()))))
             }
         }
@@ -231,20 +239,20 @@ impl Identify {
 
     // Out of line: each step ends with one.
     #[inline(never)]
-    fn enter(&mut self, now_us: u64, step: Step, setpoint: Setpoint) {
-        self.step = step;
+    fn enter(&mut self, now_us: u64, step: (Identification, Step), setpoint: Setpoint) {
+        self.step = Some(step);
         self.since_us = now_us;
         self.setpoint = setpoint;
         self.means = Means::default();
     }
 
-    fn excite(&mut self, inputs: &Inputs, number: u8) -> Outcome {
+    fn excite(&mut self, inputs: &Inputs, part: Identification, number: u8) -> Outcome {
         let (share, ripple) = EXCITATIONS[usize::from(number % EXCITATIONS_PER_PHASE)];
         let current_a = share * EXCITED_SHARE * inputs.limit_a;
         let current = inputs.scale.current_from_a(current_a);
-        let excitation = Excitation::new(number / EXCITATIONS_PER_PHASE, current, ripple);
+        let excitation = Excitation::new(part, number / EXCITATIONS_PER_PHASE, current, ripple);
         let setpoint = Setpoint::Excite(excitation);
-        self.enter(inputs.now_us, Step::Excite(number), setpoint);
+        self.enter(inputs.now_us, (part, Step::Excite(number)), setpoint);
         Outcome::Progress(5 * number)
     }
 
@@ -252,6 +260,7 @@ impl Identify {
     fn measure_excitation(
         &mut self,
         inputs: &Inputs,
+        part: Identification,
         number: u8,
         passed_s: f32,
     ) -> Result<Option<Outcome>, &'static str> {
@@ -283,17 +292,18 @@ impl Identify {
         self.winding
             .take(phase, excitation_of_phase, self.means.get(), period_s);
         if number + 1 < EXCITED {
-            return Ok(Some(self.excite(inputs, number + 1)));
+            return Ok(Some(self.excite(inputs, part, number + 1)));
         }
         let supply = (inputs.scale, inputs.bus_v());
         self.winding
             .evaluate(&mut self.report, &mut self.motor, supply)?;
-        self.enter(inputs.now_us, Step::Spin, Setpoint::Voltage(SPIN_SHARE));
+        let setpoint = Setpoint::Voltage(SPIN_SHARE);
+        self.enter(inputs.now_us, (part, Step::Spin), setpoint);
         Ok(Some(Outcome::Progress(60)))
     }
 
     /// Measures a rotor turned by six-step.
-    fn measure_spin(&mut self, inputs: &Inputs) -> Option<Outcome> {
+    fn measure_spin(&mut self, inputs: &Inputs, part: Identification) -> Option<Outcome> {
         let snapshot = inputs.snapshot;
         if snapshot.phase != Phase::Run {
             return None;
@@ -309,28 +319,37 @@ impl Identify {
         }
         let dead_v = self.winding.dead_v();
         self.motor.flux_wb = Shaft::rough_flux_wb(self.means.get(), &self.motor, dead_v);
-        self.enter(inputs.now_us, Step::Release, Setpoint::Stop);
+        self.enter(inputs.now_us, (part, Step::Release), Setpoint::Stop);
         Some(Outcome::Progress(70))
     }
 
     /// Waits until the bridge is off: only then can the drive be rebuilt.
-    fn await_release(&mut self, inputs: &Inputs, passed_s: f32) -> Option<Outcome> {
+    fn await_release(
+        &mut self,
+        inputs: &Inputs,
+        part: Identification,
+        passed_s: f32,
+    ) -> Option<Outcome> {
         if inputs.snapshot.phase != Phase::Idle || passed_s < ADOPTED_S {
             return None;
         }
         self.rpm_max = self
             .shaft
             .choose_speed(inputs.bus_v(), &self.motor, inputs.scale);
-        self.enter(inputs.now_us, Step::Rebuild, Setpoint::Stop);
+        self.enter(inputs.now_us, (part, Step::Rebuild), Setpoint::Stop);
         Some(Outcome::Assume)
     }
 
     /// Measures a run.
-    fn measure_run(&mut self, inputs: &Inputs) -> Result<Option<Outcome>, &'static str> {
+    fn measure_run(
+        &mut self,
+        inputs: &Inputs,
+        part: Identification,
+        down: bool,
+    ) -> Result<Option<Outcome>, &'static str> {
         if inputs.snapshot.phase != Phase::Run {
             return Ok(None);
         }
-        let down = self.step == Step::Down;
         if !down {
             self.risen_s = (self.risen_s + POLL_S).min(RISE_S);
             self.setpoint = self.torque(inputs, 1.0);
@@ -340,12 +359,13 @@ impl Identify {
             return Ok(None);
         }
         if !down {
-            self.enter(inputs.now_us, Step::Down, self.torque(inputs, -AGAINST));
+            let setpoint = self.torque(inputs, -AGAINST);
+            self.enter(inputs.now_us, (part, Step::Down), setpoint);
             return Ok(Some(Outcome::Progress(90)));
         }
         self.shaft
             .evaluate(&mut self.report, inputs.scale.pole_pairs)?;
-        self.enter(inputs.now_us, Step::Halt, self.setpoint);
+        self.enter(inputs.now_us, (part, Step::Halt), self.setpoint);
         Ok(None)
     }
 

@@ -306,7 +306,7 @@ parameters! {
     18 MotToneA "MOT_TONE_A" "A" Real 0.0..10.0 = 1.5 live
         "Bound of tones' phase current, peak; up to a quarter more with R or L stated wrongly; 0 is silent";
     19 MotIdentify "MOT_IDENTIFY" "" Order 0.0..2.0 = 0.0 live
-        "Identification of the motor; 0 again when it is over"
+        "Identification of the motor; 0 again when it is over" in Identification
             0 "end it"
             1 "begin it: the motor turns"
             2 "keep what it has found";

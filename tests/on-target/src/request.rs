@@ -123,7 +123,7 @@ pub fn read_period(words: &[u32; PERIOD_WORDS]) -> (Sample, Setpoint) {
         5 => Setpoint::Voltage(I1F31::from_bits(value)),
         6 => Setpoint::Tone(Speed::from_bits(value)),
         8 => Setpoint::Pull(Pull::from_number(value as u8)),
-        9 => Setpoint::Excite(Excitation::from_word(value as u32)),
+        9 => Excitation::from_word(value as u32).map_or(Setpoint::Stop, Setpoint::Excite),
         _ => Setpoint::Test(Current::from_bits(value)),
     };
     (sample, setpoint)
