@@ -3,6 +3,7 @@
 //! being sent. Run with `--release`.
 
 use mavlink::dialects::ardupilotmega::{PARAM_REQUEST_LIST_DATA, PARAM_VALUE_DATA};
+use siskin_control::params::ParamId;
 
 use crate::common::{
     BIDIRECTIONAL_300, BIDIRECTIONAL_600, BIDIRECTIONAL_1200, Board, MS, Scope, Throttle, image,
@@ -157,5 +158,45 @@ fn who_sends_while_the_esc_starts_is_answered() {
                 "{protocol}, from {from_us} us: {unanswered}"
             );
         }
+    }
+}
+
+/// Nothing is known of the motor, as delivered: six-step, whose interrupts are longer.
+const UNKNOWN: [(ParamId, f32); 5] = [
+    (ParamId::MotRMohm, 0.0),
+    (ParamId::MotLUh, 0.0),
+    (ParamId::MotFluxMwb, 0.0),
+    (ParamId::MotJGcm2, 0.0),
+    (ParamId::CtlMode, 2.0),
+];
+
+/// In six-step at most one reply in a thousand is left out, at each rate and each of these throttles.
+#[test]
+fn every_reply_comes_as_delivered() {
+    const FRAMES: usize = 3_000;
+    for (protocol, bit_hz) in [
+        (BIDIRECTIONAL_300, 300e3),
+        (BIDIRECTIONAL_600, 600e3),
+        (BIDIRECTIONAL_1200, 1.2e6),
+    ] {
+        let mut board = Board::new(&image(), &UNKNOWN);
+        board.protocol = protocol;
+        board.throttle = Throttle::Dshot(0);
+        board.run(400 * MS);
+        board.throttle = Throttle::Dshot(VALUE);
+        let turns = board.run_until(50 * MS, 6_000 * MS, |board| board.rpm() > 500.0);
+        assert!(turns.is_some(), "{:?}", board.heard.texts());
+        board.run(500 * MS);
+        let gap_ns = |frame: usize| 950_000.0 + 100_000.0 * (frame as f64 * 0.569_840).fract();
+        let exchanges = FlightController { bit_hz }.fly(&mut board, VALUE, FRAMES, gap_ns);
+        let heard = exchanges
+            .iter()
+            .filter(|exchange| exchange.word().is_some());
+        let missing = FRAMES - heard.count();
+        println!(
+            "{bit_hz} bit/s, {:.0} rpm: {missing} of {FRAMES} are missing",
+            board.rpm()
+        );
+        assert!(missing <= FRAMES / 1_000, "{bit_hz}: {missing}");
     }
 }
