@@ -273,7 +273,7 @@ impl Esc {
     /// Likewise of a text.
     pub fn warn_of(&mut self, trouble: &str) {
         let mut warning = Warning::new();
-        // A longer one would be cut on MAVLink anyway.
+        // None is longer.
         let _ = warning.push_str(trouble);
         self.warn(warning);
     }

@@ -47,7 +47,7 @@ impl Laboratory {
         } else if let Err(error) = esc::check(&wanted, &bench.sensing.board(bench.delay)) {
             error.reason
         } else if !id.entry().live {
-            "the motor turns; stop it first"
+            "the motor turns"
         } else {
             "the ESC takes signed commands only"
         };

@@ -48,7 +48,7 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
         port.lock(Throttle::resume);
     }
     if let Some(text) = last_words::take(reset.starved) {
-        esc.warn(text);
+        esc.warn_of(&text);
     }
     if record::KEPT {
         let record = interrupt::record();

@@ -73,8 +73,6 @@ struct Limits {
     /// 1.5 bits. Within a frame no level is as long as 1.3, even of the slowest clock; after it, senders leave at least
     /// 2 bits plus the remainder of the last one.
     rest_ticks: u32,
-    /// Nominal duration of 16 bits.
-    frame_ticks: u32,
 }
 
 impl Decoder {
@@ -272,7 +270,9 @@ impl Decoder {
         let limits = self.limits(span)?;
         let frame = Frame::from_bits(read(span, bit)? ^ check_mask(bidirectional))?;
         let frame_ticks = span + span / WHOLE_BITS;
-        let off = frame_ticks.abs_diff(limits.frame_ticks) > limits.frame_ticks / NOMINAL_PART;
+        // The least span is three quarters of the nominal one, which has 15 bits of 16.
+        let nominal = limits.span_least * 64 / 45;
+        let off = frame_ticks.abs_diff(nominal) > nominal / NOMINAL_PART;
         Some(Event::Frame {
             rate: limits.rate,
             bidirectional,
@@ -338,7 +338,6 @@ impl Limits {
             span_least: ticks(3 * WHOLE_BITS, 4),
             span_most: ticks(27 * WHOLE_BITS, 20) + 1,
             rest_ticks: ticks(3, 2),
-            frame_ticks: ticks(WHOLE_BITS + 1, 1),
         })
     }
 }

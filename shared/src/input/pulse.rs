@@ -54,8 +54,6 @@ struct Limits {
     most: u32,
     /// The minimum period from pulse to pulse.
     period: u32,
-    /// The most that alike widths differ.
-    alike: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -107,12 +105,12 @@ impl Decoder {
         self.fall_at = at_ticks;
         let limits = self.limits(width);
         let sound = core::mem::replace(&mut self.sound, limits.is_some());
-        let Some(Limits { kind, alike, .. }) = limits else {
+        let Some(limits) = limits else {
             return Some(Event::Bad);
         };
-        let likeness = self.likeness(width, alike);
+        let likeness = self.likeness(width, limits.alike());
         sound.then(|| Event::Pulse {
-            kind,
+            kind: limits.kind,
             width_ns: self.nanoseconds(width),
             likeness,
         })
@@ -166,6 +164,11 @@ impl Decoder {
 }
 
 impl Limits {
+    /// Returns the most that alike widths differ.
+    fn alike(&self) -> u32 {
+        (self.most / 11 * 10 - self.least / 4 * 5) / ALIKE_PART
+    }
+
     fn new(tick_hz: u32, kind: Pulse) -> Self {
         let end_points = kind.end_points_ns();
         Self {
@@ -176,7 +179,6 @@ impl Limits {
                 Pulse::Multishot => ticks(tick_hz, MULTISHOT_PERIOD_NS),
                 _ => 0,
             },
-            alike: ticks(tick_hz, (end_points.most - end_points.least) / ALIKE_PART),
         }
     }
 }

@@ -14,7 +14,7 @@ pub(super) fn words(news: News) -> Option<(MavSeverity, [&'static str; 2])> {
         ),
         News::Lost { armed: true } => (
             MavSeverity::MAV_SEVERITY_WARNING,
-            ["Throttle: signal lost while armed", ""],
+            ["Throttle: signal lost", " while armed"],
         ),
         News::Lost { armed: false } => (
             MavSeverity::MAV_SEVERITY_NOTICE,
@@ -22,7 +22,7 @@ pub(super) fn words(news: News) -> Option<(MavSeverity, [&'static str; 2])> {
         ),
         News::Unknown => (
             MavSeverity::MAV_SEVERITY_WARNING,
-            ["Throttle: a signal of no known kind", ""],
+            ["Throttle: ", "unknown signal"],
         ),
         News::OpenThrottle => (
             MavSeverity::MAV_SEVERITY_WARNING,

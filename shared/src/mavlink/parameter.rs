@@ -94,11 +94,11 @@ fn take(id: ParamId, value: f32, stopped: bool, context: &mut Context) -> Result
         return Err(Refusal::new(WRONG_TYPE, "send it as REAL32"));
     }
     if !stopped && !id.entry().live {
-        let reason = "the motor turns; stop it first";
+        let reason = "the motor turns";
         return Err(Refusal::new(NOT_PERMITTED, reason));
     }
     if id.lacks(value) && value != context.params.get(id) {
-        let reason = "not in this image: flash one that has it";
+        let reason = "not in this image";
         return Err(Refusal::new(OUT_OF_RANGE, reason));
     }
     change(id, value, context)

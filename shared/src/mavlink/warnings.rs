@@ -2,8 +2,8 @@
 
 use heapless::String;
 
-/// A text composed at run time; STATUSTEXT has room for 50 letters.
-pub type Warning = String<50>;
+/// A text composed at run time: what was tried, a parameter and a reason. Beyond 50 letters it takes two STATUSTEXTs.
+pub type Warning = String<76>;
 
 /// The pending warnings, at most two, and the last one for later readers.
 #[derive(Clone, Debug)]

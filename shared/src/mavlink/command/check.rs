@@ -30,7 +30,6 @@ impl Commands {
         let identifies = |command: &Command| command.number == IDENTIFY;
         let gone = |beat_us| (now_us as u32).wrapping_sub(beat_us) > GONE_US;
         if self.under_way.as_ref().is_some_and(identifies) && self.beat_us.is_some_and(gone) {
-            self.beat_us = None;
             self.act = Some(Act::AbandonIdentification);
         }
     }

@@ -432,7 +432,7 @@ fn what_the_wire_tells_is_told_in_words() {
             News::Identified(bidirectional),
             &["Throttle: bidirectional DShot600"][..],
         ),
-        (News::Unknown, &["Throttle: a signal of no known kind"]),
+        (News::Unknown, &["Throttle: unknown signal"]),
         (News::OpenThrottle, &["Throttle is open: lower it to arm"]),
         (
             News::Lost { armed: true },
