@@ -63,13 +63,13 @@ fn a_flash_that_refuses_keeps_what_was_stored() {
     assert!(refused.starts_with("storage"), "{refused}");
     assert!(device.store(Request::FactoryReset).is_err());
     assert_eq!(limit(&device), 12.0, "in force until the restart");
-    device.reboot();
+    device.reboot(true);
     assert_eq!(limit(&device), 15.0);
 
     run(&mut device, 250);
     set(&mut device, 12.0);
     assert_eq!(device.store(Request::Save), Ok(()));
-    device.reboot();
+    device.reboot(true);
     assert_eq!(limit(&device), 12.0);
 }
 
@@ -139,7 +139,7 @@ fn what_takes_the_place_of_the_factorys_value_gives_way_to_a_stored_one() {
     set(&mut device, 12.5);
     assert_eq!(device.store(Request::Load), Ok(()));
     assert_eq!(limit(&device), 15.0);
-    device.reboot();
+    device.reboot(true);
     assert_eq!(limit(&device), 15.0);
     drop(device);
     let mut device = start(Vec::new());

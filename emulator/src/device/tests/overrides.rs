@@ -19,7 +19,7 @@ const ID: ParamId = ParamId::LimPhaseA;
 /// Asserts what a restart of the ESC finds, and another start.
 #[track_caller]
 fn found(path: &Path, mut device: Device, defaults: &[(ParamId, f32)], value: f32) {
-    device.reboot();
+    device.reboot(true);
     assert_eq!(limit(&device), value);
     drop(device);
     assert_eq!(limit(&given(path, Vec::new(), defaults.to_vec())), value);
