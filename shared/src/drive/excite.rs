@@ -41,6 +41,8 @@ traced! {
         /// The mean voltage, and the square wave's amplitude.
         u: Voltage,
         h: Voltage,
+        /// Mean of the phase currents' sum.
+        sum: AdcCounts,
         /// Currents of the last two samples, along and across the axis.
         before: [AlphaBeta<Current>; 2],
         /// Means of the current and of the square wave's current.
@@ -50,6 +52,23 @@ traced! {
         mean_u: Voltage,
         mean_h: Voltage,
     }
+}
+
+/// log2 of the trip level over the largest mean sum of the phase currents.
+const SUM_SHIFT: u32 = 2;
+
+/// log2 of the periods in that mean.
+const SUM_MEAN_SHIFT: u32 = 5;
+
+/// Returns false if the currents' sum shows that a sensor does not read its current: the voltage would rise until the
+/// others trip, and a winding then carries twice their current.
+pub(super) fn trusts(state: &mut State, trip: AdcCounts, currents: [AdcCounts; 3]) -> bool {
+    let sum = currents
+        .iter()
+        .map(|current| current.to_bits())
+        .sum::<i32>();
+    state.sum += (AdcCounts::from_bits(sum) - state.sum) >> SUM_MEAN_SHIFT;
+    state.sum.abs() <= trip >> SUM_SHIFT
 }
 
 /// Runs one period of an excitation. The snapshot's d current and voltage are the means along the axis, those of q

@@ -10,7 +10,7 @@ use super::schedule::{self, Work};
 use super::state::State;
 use super::transitions::Why;
 use super::{charge, excite, off, self_test, six_step, tone};
-use crate::protection;
+use crate::protection::{self, Fault};
 use crate::units::AdcCounts;
 
 /// One control period: from the sample to what the bridge does in the next period.
@@ -304,6 +304,12 @@ fn tone_or_test(
     match (setpoint, &config.tone) {
         (Setpoint::Pull(pull), _) => {
             self_test::period(config, (&mut state.self_test, shared), currents, *pull)
+        }
+        (Setpoint::Excite(_), _)
+            if !excite::trusts(&mut state.excite, shared.protection.trip, currents) =>
+        {
+            state.change(config, Why::Tripped(Fault::CurrentSensor));
+            Bridge::Off
         }
         (Setpoint::Excite(excitation), _) => {
             excite::period(config, (&mut state.excite, shared), currents, *excitation)
