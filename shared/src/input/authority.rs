@@ -27,9 +27,11 @@ const ARMING_PULSES: u32 = 5;
 /// Zeros, without throttle in between, that close an armed wire. In flight a zero may be another frame with errors
 /// that its checksum misses: it stops the motor until the next throttle frame. A wire is armed closed.
 const CLOSING: u8 = 10;
-/// Consecutive throttle frames, or pulses like the one before from the second on, without a bad one in between, that reopen it. They
-/// delay the first by 0.75 ms at 4 kHz, 3 ms at 1 kHz, 60 ms with a servo's 50 Hz.
+/// Consecutive throttle frames of about the same throttle, or pulses like the one before from the second on, without a
+/// bad one in between, that reopen it. They delay the first by 0.75 ms at 4 kHz, 3 ms at 1 kHz, 60 ms with a servo's 50 Hz.
 const OPENING: u8 = 4;
+/// The most by which two such frames differ. Noise that passes its check has any throttle.
+const AGREE: Share = Share::lit("0.0625");
 
 /// The longest silence after a DShot command that is not a loss, µs. The protocol allows 260 ms after a beacon,
 /// and Betaflight's loop, which waits for it, sends the next frame 110 ms later.
@@ -123,8 +125,9 @@ pub struct Authority {
     trust: Trust,
     /// Zeros since the last throttle that was let through.
     closing: u8,
-    /// Throttle frames since the last zero or bad frame.
+    /// Throttle frames since the last zero or bad frame, and the last one's throttle.
     opening: u8,
+    throttle: Share,
     event_us: Option<u64>,
     test: Option<Test>,
     /// Somebody disarmed since the motor was last driven: until the present fault ends, this counts as zero
@@ -172,6 +175,7 @@ impl Authority {
             trust: Trust::default(),
             closing: 0,
             opening: 0,
+            throttle: Share::ZERO,
             event_us: None,
             test: None,
             forgiven: false,
@@ -216,29 +220,33 @@ impl Authority {
         if identified.is_some_and(|identified| identified != signal) {
             return self.count_failure();
         }
-        let likeness = match event {
-            Event::Pulse { likeness, .. } => likeness,
-            _ => Likeness::Both,
-        };
         let open = self.armed && self.closing < CLOSING;
-        match likeness {
-            Likeness::Both => self.trust.good(),
-            Likeness::Either if open => {}
-            _ => self.trust.bad(),
+        match event {
+            Event::Pulse {
+                likeness: Likeness::Both,
+                ..
+            } => self.trust.good_pulse(),
+            Event::Pulse {
+                likeness: Likeness::Either,
+                ..
+            } if open => {}
+            Event::Pulse { .. } => self.trust.bad(),
+            _ => self.trust.good(),
         }
         match demand {
             Demand::Zero => {
                 self.closing = self.closing.saturating_add(1);
                 self.opening = 0;
             }
-            Demand::Throttle(_) => {
+            Demand::Throttle(throttle) => {
                 self.arming = None;
                 self.test = None;
-                let row = if likeness == Likeness::Both {
-                    self.opening
-                } else {
-                    0
+                let before = core::mem::replace(&mut self.throttle, throttle);
+                let agrees = match event {
+                    Event::Pulse { likeness, .. } => likeness == Likeness::Both,
+                    _ => throttle.abs_diff(before) <= AGREE,
                 };
+                let row = if agrees { self.opening } else { 0 };
                 self.opening = row.saturating_add(1);
             }
         }

@@ -18,9 +18,12 @@ const LOW_NS: u32 = 1_000;
 /// Random pulses differ by more.
 const ALIKE_PART: u32 = 16;
 
-/// The most that of two alike periods one is a multiple of the other: a sender that leaves one out, or whose loop is
+/// The largest share of the sender's mean period by which an alike one differs, as a divisor: a sender's loop may be
 /// late.
-const ALIKE_RATIO: u32 = 2;
+const LATE_PART: u32 = 2;
+
+/// log2 of the number of alike periods in their mean.
+const MEAN_SHIFT: u32 = 3;
 
 /// Fraction bits of the tick duration.
 const TICK_PLACES: u32 = 24;
@@ -66,7 +69,8 @@ struct Spacing {
 #[derive(Clone, Copy, Debug)]
 struct Before {
     width: u32,
-    period: Option<u32>,
+    /// The mean period of its sender's pulses, `None` before the second: what comes at another rate is another's.
+    mean: Option<u32>,
 }
 
 impl Decoder {
@@ -119,17 +123,28 @@ impl Decoder {
     /// Compares the latest pulse with the one before it, and keeps it for the next.
     fn likeness(&mut self, width: u32, alike: u32) -> Likeness {
         let period = self.spacing.map(|spacing| spacing.period);
-        let Some(before) = self.before.replace(Before { width, period }) else {
+        let Some(before) = self.before.replace(Before { width, mean: None }) else {
             return Likeness::Neither;
         };
-        let in_time = before.period.zip(period).is_none_or(|(before, period)| {
-            period / ALIKE_RATIO <= before && before / ALIKE_RATIO <= period
-        });
-        match (width.abs_diff(before.width) <= alike, in_time) {
+        let mean = before.mean.or(period);
+        let off = mean
+            .zip(period)
+            .map_or(0, |(mean, period)| period.abs_diff(mean));
+        let in_time = mean.is_none_or(|mean| off <= mean / LATE_PART);
+        let likeness = match (width.abs_diff(before.width) <= alike, in_time) {
             (true, true) => Likeness::Both,
             (false, false) => Likeness::Neither,
             _ => Likeness::Either,
-        }
+        };
+        let mean = match (mean, period) {
+            (Some(mean), Some(period)) if likeness == Likeness::Both => {
+                // Both are below 2³¹: a longer pause is a silence.
+                Some(mean.wrapping_add_signed((period as i32 - mean as i32) >> MEAN_SHIFT))
+            }
+            _ => mean,
+        };
+        self.before = Some(Before { width, mean });
+        likeness
     }
 
     /// Records that an edge was missed: the next pulse counts as following a bad one.

@@ -21,6 +21,8 @@ const GOOD: u8 = 3;
 const BELIEVED: u8 = 15;
 /// Upper clamp: after a long good run, up to twelve bad frames in a row cost no good one.
 const MOST: u8 = 24;
+/// The same of pulses: a stick that takes the throttle from one end to the other makes up to sixteen unlike ones.
+const MOST_PULSES: u8 = 34;
 
 /// The evidence that a wire's frames are genuine.
 #[derive(Clone, Debug)]
@@ -34,9 +36,14 @@ impl Default for Trust {
 }
 
 impl Trust {
-    /// Adds a frame or pulse that passes its check.
+    /// Adds a frame that passes its check.
     pub(super) fn good(&mut self) {
         self.0 = MOST.min(self.0 + GOOD);
+    }
+
+    /// Adds a pulse that does.
+    pub(super) fn good_pulse(&mut self) {
+        self.0 = MOST_PULSES.min(self.0 + GOOD);
     }
 
     /// Returns true if the wire is to be believed.

@@ -142,12 +142,16 @@ fn a_pulse_is_held_against_the_one_before() {
         assert_eq!(likeness(low - alike_ns - 1, middle + alike_ns + 1), Either);
         assert_eq!(likeness(low, middle), Either, "back is as far");
         assert_eq!(likeness(low, middle), Both);
-        // In time: one left out, and back.
+        // In time: late by less than half, one left out, and another sender's for ever.
         let period = low + middle;
-        assert_eq!(likeness(low + period, middle), Both);
+        assert_eq!(likeness(low + period / 2 - 10, middle), Both);
         assert_eq!(likeness(low, middle), Both);
-        assert_eq!(likeness(low + period + 2, middle), Either);
-        assert_eq!(likeness(low, middle - alike_ns - 1), Neither);
+        assert_eq!(likeness(low + period, middle), Either);
+        assert_eq!(likeness(low, middle), Both);
+        for _ in 0..20 {
+            assert_eq!(likeness(low + 2 * period, middle), Either);
+        }
+        assert_eq!(likeness(low + 2 * period, middle - alike_ns - 1), Neither);
     }
 }
 

@@ -53,15 +53,19 @@ fn of_wires_that_become_noise_at_zero_one_in_2170_turns_the_motor() {
 #[test]
 fn the_fourth_throttle_in_a_row_opens() {
     let mut bench = Bench::armed();
-    for between in [event(0), event(47), Event::Bad] {
+    // A throttle that does not agree begins a row of its own.
+    for between in [event(0), event(47), Event::Bad, event(48)] {
         bench.play(3, event(1000));
         assert_eq!(bench.authority.command(), Command::Zero);
         bench.play(1, between);
     }
     bench.play(3, event(1000));
     assert_eq!(bench.authority.command(), Command::Zero);
-    bench.play(1, event(48));
-    assert_eq!(bench.authority.command(), Command::Throttle(Share::ZERO));
+    bench.play(1, event(1100));
+    assert!(matches!(
+        bench.authority.command(),
+        Command::Throttle(throttle) if throttle > 0.5
+    ));
     // Once open, it obeys each frame at once, even after bad ones.
     bench.play(1, event(2047));
     assert_eq!(bench.authority.command(), Command::Throttle(Share::MAX));
