@@ -13,9 +13,9 @@ use std::ops::Range;
 
 use siskin_control::check::{Item, Own, Probe};
 use siskin_control::drive::Sample;
-use siskin_control::esc::{Esc, obey};
+use siskin_control::esc::{Esc, check, obey};
 use siskin_control::mavlink::{Frame, Receiver, Request};
-use siskin_control::params::{BOSSO_MOTOR, Board, BuildError, ParamId};
+use siskin_control::params::{BOSSO_MOTOR, Board, BuildError, ParamId, Params};
 use siskin_control::record::Record;
 use siskin_control::store::{self, Integrity};
 use siskin_control::throttle::Throttle;
@@ -200,10 +200,20 @@ impl Device {
             return Err(StartError::CorruptStorage);
         }
         let params = &mut loaded.kept.params;
-        let mut overrides = Overrides::new(defaults, overrides);
-        overrides.apply(params);
+        let stored = params.clone();
         let board = bench.sensing.board(bench.delay);
-        let (mut esc, throttle) = Esc::new(params.clone(), board, CAPTURE_HZ, link_bytes_per_s)?;
+        let mut overrides = Overrides::new(defaults.clone(), overrides);
+        overrides.apply(params);
+        if let Err(error) = check(params, &board) {
+            // The ESC takes what is stored, fitting or not, but not what is given to the program.
+            let mut without = stored.clone();
+            Overrides::new(defaults, []).apply(&mut without);
+            if stored == Params::default() || check(&without, &board).is_ok() {
+                return Err(error.into());
+            }
+        }
+        let (mut esc, throttle) =
+            Esc::power_up(params.clone(), board, CAPTURE_HZ, link_bytes_per_s);
         esc.recall(&loaded);
         // The chip's memory, which outlives the program: 1.2 KB, never freed.
         let record = &*Box::leak(Box::<Record>::default());
@@ -412,10 +422,7 @@ impl Device {
                 self.overrides.erased();
             }
             self.overrides.apply(&mut kept.params);
-            self.esc
-                .replace(&mut self.throttle, &mut kept)
-                .map_err(|error| error.reason)?;
-            self.configure();
+            self.esc.replace(&mut kept);
         } else {
             self.overrides.saved(&kept.params);
         }
@@ -446,15 +453,12 @@ impl Device {
         let mut loaded = store::load(&mut self.flash, STORE);
         let params = &mut loaded.kept.params;
         self.overrides.apply(params);
-        // What cannot be built now was never in force: the old values stay.
-        let Ok((mut esc, mut throttle)) = Esc::new(
+        let (mut esc, mut throttle) = Esc::power_up(
             params.clone(),
             self.board,
             CAPTURE_HZ,
             self.link_bytes_per_s,
-        ) else {
-            return;
-        };
+        );
         esc.recall(&loaded);
         esc.regroup(&self.esc);
         if !power_up {

@@ -1,15 +1,13 @@
 //! The ESC outside the PWM interrupt, shared by the firmware's tasks and the emulator's loop. Edges, frames and
 //! snapshots go in; set-points, frames and requests come out.
 
-use core::mem::MaybeUninit;
-
 use heapless::Vec;
 
 use crate::answer::info::info;
 use crate::check::Check;
 #[cfg(feature = "drift")]
 use crate::drive::Tracker;
-use crate::drive::{Config, CurrentMonitor, Drift, Phase, Setpoint, Snapshot, put_default};
+use crate::drive::{Config, CurrentMonitor, Drift, Phase, Setpoint, Snapshot};
 use crate::identify::Identify;
 use crate::input::authority::{Command, DriveStatus};
 use crate::math::Real;
@@ -24,12 +22,14 @@ use crate::telemetry::{Charge, Telemetry};
 use crate::throttle::{LockThrottle, LockedAuthority, TaskDemands, Throttle};
 use crate::tune::Tune;
 use crate::units::Scale;
+use fit::Overrides;
 use storage::{Asker, Storage, Unstored};
 use tunes::Tunes;
 
 mod check;
 #[cfg(feature = "drift")]
 mod drift;
+mod fit;
 #[cfg(feature = "group")]
 mod group;
 mod identify;
@@ -39,6 +39,7 @@ mod storage;
 mod tunes;
 mod wire;
 
+pub use fit::{PowerUp, check};
 pub use storage::obey;
 
 /// How long a wire with a signal must have demanded rest before the flash is written, µs: writing stalls the
@@ -64,6 +65,10 @@ pub struct Esc {
     storage: Storage,
     record: Option<&'static Record>,
     overrides: Overrides,
+    /// Why the parameters make no drive: the motor is off, and the drive keeps its configuration.
+    unfit: Option<BuildError>,
+    /// When the user is to be told of that.
+    tells_us: u64,
     tunes: Tunes,
     telemetry: Telemetry,
     params: Params,
@@ -85,63 +90,6 @@ pub struct Esc {
     component: Component,
 }
 
-/// Values the drive runs with in place of the parameters.
-#[derive(Clone, Copy, Debug)]
-struct Overrides {
-    /// The frequency at power-up, which the timer runs at, Hz.
-    pwm_freq_hz: f32,
-    /// Dead time, ns.
-    pwm_deadtime_ns: f32,
-    /// A command has turned the direction against `MOT_DIR`.
-    opposite: bool,
-}
-
-impl Overrides {
-    /// Returns the parameters that the drive actually runs with.
-    fn running(self, params: &Params) -> Params {
-        let mut running = params.clone();
-        let direction = params.get(ParamId::MotDir);
-        let kept = [
-            (ParamId::PwmFreqHz, self.pwm_freq_hz),
-            (ParamId::PwmDeadtimeNs, self.pwm_deadtime_ns),
-            (
-                ParamId::MotDir,
-                if self.opposite {
-                    1.0 - direction
-                } else {
-                    direction
-                },
-            ),
-        ];
-        for (id, value) in kept {
-            // The first two were in range at power-up, and a direction is 0 or 1.
-            let _ = running.set(id, value);
-        }
-        running
-    }
-
-    /// Checks that these parameters make a valid drive, now and after the next restart.
-    fn check(self, params: &Params, board: &Board) -> Result<(), BuildError> {
-        check(params, board)?;
-        check(&self.running(params), board)
-    }
-}
-
-/// Checks that parameters make a valid drive.
-///
-/// # Errors
-/// The parameter that does not fit the board.
-pub fn check(params: &Params, board: &Board) -> Result<(), BuildError> {
-    check_drifted(params, board, Drift::NONE)
-}
-
-/// The same for a motor that has drifted. Never inlined: a configuration takes 0.9 KB of stack.
-#[inline(never)]
-fn check_drifted(params: &Params, board: &Board, drift: Drift) -> Result<(), BuildError> {
-    let mut place = MaybeUninit::<Config>::uninit();
-    build_in(params, board, drift, put_default(&mut place))
-}
-
 impl Esc {
     /// Creates an ESC at power-up, and its throttle.
     ///
@@ -157,24 +105,35 @@ impl Esc {
         link_bytes_per_s: u32,
     ) -> Result<(Self, Throttle), BuildError> {
         check(&params, &board)?;
-        let throttle = Throttle::new(tick_hz, &params, &board);
-        Ok((Self::unchecked(params, board, link_bytes_per_s), throttle))
+        Ok(Self::power_up(params, board, tick_hz, link_bytes_per_s))
     }
 
-    /// Creates an ESC at power-up without its throttle, from parameters known to fit the board ([`check()`]).
+    /// The same with parameters that may not fit: the motor is off until they do.
+    pub fn power_up(
+        params: Params,
+        board: Board,
+        tick_hz: u32,
+        link_bytes_per_s: u32,
+    ) -> (Self, Throttle) {
+        let drive = PowerUp::new(&params, &board);
+        let esc = Self::alone(params, board, drive, link_bytes_per_s);
+        let throttle = Throttle::new(tick_hz, &esc.running(), &board);
+        (esc, throttle)
+    }
+
+    /// Creates an ESC at power-up without its throttle, which is made from [`Esc::running`].
     ///
     /// Never inlined: on the chip this and [`Throttle::new`] construct in place, since moving the two through
     /// [`Esc::new`] takes 10 KB of stack.
     #[inline(never)]
-    pub fn unchecked(params: Params, board: Board, link_bytes_per_s: u32) -> Self {
+    pub fn alone(params: Params, board: Board, drive: PowerUp, link_bytes_per_s: u32) -> Self {
         Self {
             board,
-            overrides: Overrides {
-                pwm_freq_hz: params.get(ParamId::PwmFreqHz),
-                pwm_deadtime_ns: params.get(ParamId::PwmDeadtimeNs),
-                opposite: false,
-            },
-            scale: scale(&params, &board),
+            overrides: drive.overrides,
+            unfit: drive.unfit,
+            // The end of the self-test tells it.
+            tells_us: u64::MAX,
+            scale: drive.scale,
             component: Component::new(&params, &board.image, link_bytes_per_s),
             telemetry: Telemetry::new(),
             charge: Charge::default(),
@@ -205,7 +164,7 @@ impl Esc {
     /// Returns the interrupt's configuration, computed anew at each call: it is larger than everything else.
     ///
     /// # Errors
-    /// Never with the parameters in force, which have been validated.
+    /// Never when it is due: at power-up, and after [`Request::ParamsChanged`].
     pub fn config(&self) -> Result<Config, BuildError> {
         let mut config = Config::default();
         self.config_in(&mut config)?;
@@ -226,17 +185,7 @@ impl Esc {
         build_in(&running, &self.board, Drift::NONE, place)
     }
 
-    /// Returns the parameters as the drive runs with them, including the motor assumed by a running
-    /// identification.
-    fn running(&self) -> Params {
-        let mut running = self.overrides.running(&self.params);
-        if self.identify.is_under_way() {
-            self.identify.assume(&mut running);
-        }
-        running
-    }
-
-    /// Returns the parameters in force.
+    /// Returns the parameters as they are set.
     pub fn params(&self) -> &Params {
         &self.params
     }
@@ -306,6 +255,7 @@ impl Esc {
         if self.storage.reminds(now_us) {
             self.warn_of(storage::LOST);
         }
+        self.tell_unfit(now_us);
         self.with_component(throttle, now_us, |component, context| {
             component.poll(context, send);
         });
@@ -343,6 +293,7 @@ impl Esc {
             too_hot: self.too_hot,
             barred: self.check.powers_up()
                 || self.storage.is_lost()
+                || self.unfit.is_some()
                 || !self.check.report.may_turn(&self.params),
         }
     }
@@ -355,7 +306,7 @@ impl Esc {
     /// is armed meanwhile.
     pub fn take_request(&mut self, throttle: &mut impl LockThrottle) -> Option<Request> {
         let now_us = self.polled_us.unwrap_or(0);
-        if core::mem::take(&mut self.motor_reassumed) {
+        if core::mem::take(&mut self.motor_reassumed) && self.unfit.is_none() {
             self.apply(throttle);
             return Some(Request::ParamsChanged);
         }
@@ -365,21 +316,15 @@ impl Esc {
         }
         match request {
             Some(Request::ParamsChanged) => {
-                self.apply(throttle);
-                return request;
+                if self.fits(now_us) {
+                    self.apply(throttle);
+                    return request;
+                }
             }
             Some(Request::Reboot) => {
                 self.storage.reboot();
                 if self.storage.reboots_later(now_us) {
                     self.warn_of("Reboot waits up to 3 min for the next save");
-                }
-            }
-            Some(Request::FactoryReset) => {
-                let mut defaults = Params::default();
-                defaults.fit(&self.board);
-                match self.overrides.check(&defaults, &self.board) {
-                    Ok(()) => self.storage.ask(request),
-                    Err(error) => self.component.storage_done(Err(error.reason)),
                 }
             }
             // MAVLink would store a direction, and with it all the settings that nobody has restored.
@@ -447,7 +392,6 @@ impl Esc {
     }
 
     fn apply(&mut self, throttle: &mut impl LockThrottle) {
-        // Every change has been validated: it makes a valid drive.
         self.scale = scale(&self.running(), &self.board);
         throttle.lock(|throttle| throttle.adopt(&self.params, self.scale));
         self.update_info(throttle);
@@ -476,6 +420,7 @@ impl Esc {
             identification: &self.identify.report,
             record: self.record,
             authority: &mut LockedAuthority(throttle),
+            unfit: self.unfit,
             validate: &|params| overrides.check(params, &board),
         };
         run(&mut self.component, &mut context);

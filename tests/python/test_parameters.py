@@ -1,6 +1,7 @@
 """The parameter protocol."""
 
 import math
+import time
 
 import pytest
 
@@ -122,11 +123,73 @@ def test_every_choice_of_the_control_can_be_set_at_rest(esc, name, values):
 def test_six_step_needs_a_pwm_that_sees_its_crossings(start):
     with start("--param", "PWM_FREQ_HZ=40000").connect() as esc:
         assert esc.set_param("CTL_DRIVE", 1.0) == 1.0
+        time.sleep(1.0)
+        assert not unfit(esc)
     with start().connect() as esc:
+        assert esc.set_param("CTL_DRIVE", 1.0) == 1.0
+        esc.wait("STATUSTEXT", lambda m: m.text.startswith("Motor off: PWM_FREQ_HZ 24000.000 "))
+        assert esc.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1) == dialect.MAV_RESULT_DENIED
+
+
+def unfit(esc, mark: int = 0) -> list[str]:
+    """Returns why the motor is off, as told since the mark."""
+    told = [m.text for m in esc.since(mark, "STATUSTEXT")]
+    return [text for text in told if text.startswith("Motor off: ")]
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_another_motor_s_parameters_can_be_set_in_any_order(start, tmp_path, reverse):
+    """From a bench at 24 V to one of 10 V and 60 kHz, which only a restart brings; a client does that in its own order."""
+    with start("--bench", "whoop").connect() as esc:
+        wanted = esc.params()
+    storage = tmp_path / "flash.bin"
+    emulator = start(storage=storage)
+    with emulator.connect() as esc, emulator.throttle():
+        esc.wait_armed()
         mark = esc.mark()
-        assert esc.set_param("CTL_DRIVE", 1.0) == 2.0
-        reason = esc.wait("STATUSTEXT", lambda m: "PWM_FREQ_HZ" in m.text, mark)
-        assert reason is not None, "no reason given"
+        for name in sorted(wanted, reverse=reverse):
+            if name not in ("MOT_KV", "MOT_IDENTIFY"):
+                assert esc.set_param(name, wanted[name]) == wanted[name], name
+        assert esc.params() == pytest.approx(wanted)
+        esc.next("HEARTBEAT")
+        told = unfit(esc, mark)
+        assert len(told) <= 1, told
+    with emulator.connect() as esc:
+        assert esc.command(dialect.MAV_CMD_PREFLIGHT_STORAGE, 1) == dialect.MAV_RESULT_ACCEPTED
+    emulator.kill()
+    emulator = start("--bench", "whoop", storage=storage)
+    with emulator.connect() as esc, emulator.throttle() as throttle:
+        assert esc.params() == pytest.approx(wanted)
+        esc.wait_armed()
+        throttle.value = 500
+        esc.wait_rpm(3000, 60000)
+        assert not unfit(esc)
+
+
+def test_what_makes_no_drive_is_stored_and_found_by_a_restart_with_the_motor_off(start, tmp_path):
+    storage = tmp_path / "flash.bin"
+    why = "Motor off: CTL_BW_CUR_HZ 2000.000 above a twentieth"
+    emulator = start(storage=storage)
+    with emulator.connect() as esc:
+        assert esc.set_param("CTL_BW_CUR_HZ", 2000.0) == 2000.0
+        assert esc.set_param("MOT_POLE_PAIRS", 11.0) == 11.0
+        assert esc.wait("STATUSTEXT", lambda m: m.text == why)
+        assert esc.command(dialect.MAV_CMD_PREFLIGHT_STORAGE, 1) == dialect.MAV_RESULT_ACCEPTED
+    emulator.kill()
+    emulator = start(storage=storage)
+    with emulator.connect() as esc, emulator.throttle() as throttle:
+        assert esc.read_param("CTL_BW_CUR_HZ").param_value == 2000.0
+        assert esc.read_param("MOT_POLE_PAIRS").param_value == 11.0
+        mark = esc.mark()
+        assert esc.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1) == dialect.MAV_RESULT_DENIED
+        assert esc.wait("STATUSTEXT", lambda m: m.text == why, mark)
+        assert not esc.armed()
+        mark = esc.mark()
+        throttle.value = 500
+        assert esc.wait("STATUSTEXT", lambda m: m.text == why, mark)
+        throttle.value = 0
+        assert esc.set_param("CTL_BW_CUR_HZ", 0.0) == 0.0
+        esc.wait_armed()
 
 
 def test_a_value_is_kept_as_the_float_that_was_sent(esc):

@@ -116,10 +116,14 @@ impl Desk {
                 self.stored = self.esc.kept();
                 Ok(())
             }
-            Request::Load => self.replace(self.stored.clone()),
+            Request::Load => {
+                self.esc.replace(&mut self.stored.clone());
+                Ok(())
+            }
             Request::FactoryReset => {
                 self.stored = Kept::default();
-                self.replace(Kept::default())
+                self.esc.replace(&mut Kept::default());
+                Ok(())
             }
             Request::Reboot => {
                 (self.esc, self.throttle) = Self::esc(self.stored.params.clone(), self.board);
@@ -127,12 +131,6 @@ impl Desk {
             }
         };
         self.esc.storage_done(&mut self.throttle, result);
-    }
-
-    fn replace(&mut self, mut kept: Kept) -> Result<(), &'static str> {
-        self.esc
-            .replace(&mut self.throttle, &mut kept)
-            .map_err(|error| error.reason)
     }
 
     fn check(&self) {

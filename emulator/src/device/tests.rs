@@ -37,7 +37,7 @@ fn run(device: &mut Device, until_ms: u64) -> u32 {
 fn set(device: &mut Device, amps: f32) {
     let mut kept = device.esc.kept();
     kept.params.set(ParamId::LimPhaseA, amps).unwrap();
-    device.esc.replace(&mut device.throttle, &mut kept).unwrap();
+    device.esc.replace(&mut kept);
 }
 
 fn limit(device: &Device) -> f32 {

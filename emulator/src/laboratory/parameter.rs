@@ -25,7 +25,7 @@ impl Laboratory {
     /// Sets an ESC's parameter to a value in its range. The drive has it within a millisecond.
     ///
     /// # Errors
-    /// The ESC refuses it, for instance because the motor turns or the drive cannot be built so.
+    /// The ESC refuses it, for instance because the motor turns, or it is beyond the board.
     pub fn set_param(&mut self, esc: usize, id: ParamId, value: f32) -> Result<(), Refused> {
         let name = id.entry().name;
         let frame = set_frame(id, value);
@@ -39,15 +39,18 @@ impl Laboratory {
         }
         let device = self.esc(esc);
         let bench = device.rig().around().bench();
+        let board = bench.sensing.board(bench.delay);
         let mut wanted = device.esc().params().clone();
         // It is in range.
         let _ = wanted.set(id, value);
         let reason = if device.rig().is_held() {
             "the chip is in reset"
-        } else if let Err(error) = esc::check(&wanted, &bench.sensing.board(bench.delay)) {
-            error.reason
+        } else if let Some(reason) = id.beyond(value, &board) {
+            reason
         } else if !id.entry().live {
             "the motor turns"
+        } else if let Err(error) = esc::check(&wanted, &board) {
+            error.reason
         } else {
             "the ESC takes signed commands only"
         };

@@ -163,13 +163,10 @@ impl MainTask<'_> {
     #[inline(never)] // its stack is free for what comes next
     fn store(&mut self, request: Request) -> Result<(), &'static str> {
         let mut kept = self.esc.kept();
-        if !obey(request, &mut self.flash, range(), &mut kept)? {
-            return Ok(());
+        if obey(request, &mut self.flash, range(), &mut kept)? {
+            self.esc.replace(&mut kept);
         }
-        self.changed = true;
-        self.esc
-            .replace(&mut self.throttle, &mut kept)
-            .map_err(|error| error.reason)
+        Ok(())
     }
 
     /// Restarts the chip when requested, once the acknowledgement is gone.

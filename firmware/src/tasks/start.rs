@@ -2,7 +2,7 @@
 
 use embassy_executor::Spawner;
 use embassy_stm32::uid::uid;
-use siskin_control::esc::{Esc, check};
+use siskin_control::esc::{Esc, PowerUp};
 use siskin_control::image::Image;
 use siskin_control::mavlink::Receiver;
 use siskin_control::params::choice::CtlObserver;
@@ -42,7 +42,7 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
         esc.warn_of(text);
     }
     recall_rest(esc, &mut hardware.flash);
-    let mut port = open_port(esc.params());
+    let mut port = open_port(esc);
     let reset = chip::take_reset();
     if !reset.power_up {
         port.lock(Throttle::resume);
@@ -55,7 +55,7 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
         record.open();
         esc.serve(record);
     }
-    let pwm_hz = esc.params().get(ParamId::PwmFreqHz);
+    let pwm_hz = esc.pwm_hz();
     let baud = esc.params().get(ParamId::TelBaud) as u32;
     let kiss_is_free = !(KISS_TAKES_A_SENSOR && esc.params().chosen(CtlObserver::Hall));
 
@@ -107,42 +107,26 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
 pub struct Fit {
     /// The last one that was brought within its bounds, and why.
     changed: Option<(ParamId, &'static str)>,
-    /// The one for which the defaults are in force, and why.
-    refused: Option<(ParamId, &'static str)>,
 }
 
-/// Creates the ESC with the stored parameters or, if they do not fit the board, with the defaults. The store is
-/// read twice: while the ESC is constructed, the stack only has room for the parameters.
-///
-/// # Panics
-/// If the defaults do not fit the board.
+/// Creates the ESC with the stored parameters. The store is read twice: while the ESC is constructed, the stack only has
+/// room for the parameters.
 // Out of line, like the functions below: the stack one takes is free for the next.
 #[inline(never)]
 pub fn power_up(flash: &mut Storage, fit: &mut Fit) -> Esc {
     let board = board();
     let mut params = stored_params(flash);
     fit.changed = params.fit(&board);
-    if let Err(error) = check(&params, &board) {
-        fit.refused = Some((error.param, error.reason));
-        params = Params::default();
-        params.fit(&board);
-        check(&params, &board).expect("the defaults fit every board");
-    }
+    let drive = PowerUp::new(&params, &board);
     let bytes_per_s = params.get(ParamId::TelBaud) as u32 / 10;
-    Esc::unchecked(params, board, bytes_per_s)
+    Esc::alone(params, board, drive, bytes_per_s)
 }
 
 /// Makes the ESC report what became of the stored parameters.
 #[inline(never)] // its stack is free for what comes next
 fn tell(esc: &mut Esc, fit: Fit) {
-    if fit.refused.is_some() {
-        esc.lose_stored();
-    }
-    if let Some((id, reason)) = fit.refused.or(fit.changed) {
+    if let Some((id, reason)) = fit.changed {
         esc.warn_in_pieces(id.entry().name, [": ", reason, ""]);
-    }
-    if fit.refused.is_some() {
-        esc.warn_of("Parameters do not fit the board: using defaults");
     }
 }
 
@@ -168,8 +152,8 @@ fn recall_rest(esc: &mut Esc, flash: &mut Storage) {
 }
 
 #[inline(never)] // its stack is free for what comes next
-fn open_port(params: &Params) -> Port {
-    Port::open(|| Throttle::new(TICK_HZ, params, &board()))
+fn open_port(esc: &Esc) -> Port {
+    Port::open(|| Throttle::new(TICK_HZ, &esc.running(), &board()))
 }
 
 /// Starts the control interrupt with the parameters' configuration.

@@ -22,7 +22,8 @@ impl Esc {
                 if let Some(text) = self.misfits() {
                     self.warn(text);
                 }
-                self.component.check_done(passed);
+                self.component.tell_unfit();
+                self.component.check_done(passed && self.unfit.is_none());
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Follows the motor's resistance and flux, and reports them.
 
-use super::{Esc, check_drifted};
+use super::Esc;
+use super::fit::check_drifted;
 use crate::drive::{Snapshot, Stated};
 use crate::params::ParamId;
 use crate::params::choice::{CtlAdaptL, CtlDrive, CtlObserver};

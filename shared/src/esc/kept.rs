@@ -2,10 +2,9 @@
 
 use super::Esc;
 use crate::mavlink::Warning;
-use crate::params::{BuildError, ParamId};
+use crate::params::ParamId;
 use crate::record::Record;
 use crate::store::{Kept, Loaded};
-use crate::throttle::LockThrottle;
 
 impl Esc {
     /// Restores stored values at power-up. The ESC was already created with the stored parameters.
@@ -66,24 +65,17 @@ impl Esc {
         kept
     }
 
-    /// Puts other values in force, as returned by [`obey`](super::obey). The interrupt must then run with
-    /// [`Esc::config`].
+    /// Puts other values in force, as returned by [`obey`](super::obey); a [`Request::ParamsChanged`] follows, if they
+    /// fit.
     ///
-    /// # Errors
-    /// The parameter that does not fit the board; nothing has changed then.
-    pub fn replace(
-        &mut self,
-        throttle: &mut impl LockThrottle,
-        kept: &mut Kept,
-    ) -> Result<(), BuildError> {
+    /// [`Request::ParamsChanged`]: crate::mavlink::Request::ParamsChanged
+    pub fn replace(&mut self, kept: &mut Kept) {
         kept.params.fit(&self.board);
-        self.overrides.check(&kept.params, &self.board)?;
         self.params = kept.params.clone();
         self.component.keep_intervals(&kept.intervals);
         if kept.signing.is_none() {
             self.component.forget_signing();
         }
-        self.apply(throttle);
-        Ok(())
+        self.component.changed(&[]);
     }
 }

@@ -21,6 +21,7 @@ mod actions;
 mod check;
 #[cfg(feature = "drift")]
 mod drift;
+mod fit;
 mod keep;
 mod storage;
 mod warnings;
@@ -58,8 +59,12 @@ impl Bench {
     }
 
     fn at_power_up() -> Self {
-        let esc = Esc::new(Params::of(&BOSSO_MOTOR), Board::BENCH, TICK_HZ, 1_000_000);
-        let (esc, throttle) = esc.expect("the defaults fit");
+        Self::with(Params::of(&BOSSO_MOTOR))
+    }
+
+    /// Powers one up with these parameters, fitting or not.
+    fn with(params: Params) -> Self {
+        let (esc, throttle) = Esc::power_up(params, Board::BENCH, TICK_HZ, 1_000_000);
         let config = esc.config().expect("the defaults fit");
         let mut bench = Self {
             snapshot: State::new(&config).snapshot(),

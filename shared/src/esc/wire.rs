@@ -55,6 +55,10 @@ impl Esc {
             News::Calibration(Step::Done(ends)) if !self.calibrate(ends) => {
                 News::Calibration(Step::Cancelled)
             }
+            // Lowering it would not arm it.
+            News::OpenThrottle if self.unfit.is_some() => {
+                return self.component.tell_unfit();
+            }
             news => news,
         };
         self.component.report_news(news);

@@ -127,6 +127,15 @@ impl Command {
         self.trust == Trust::Full || self.asks()
     }
 
+    /// Returns true if it would have the motor turn, now or by the throttle.
+    fn energises(&self) -> bool {
+        let number = self.number;
+        matches!(
+            number,
+            COMPONENT_ARM_DISARM | DO_MOTOR_TEST | ACTUATOR_TEST | IDENTIFY
+        )
+    }
+
     fn asks(&self) -> bool {
         matches!(self.number, REQUEST_MESSAGE | GET_MESSAGE_INTERVAL)
     }
@@ -231,6 +240,10 @@ impl Commands {
         self.left |= is_taken && command.leaves();
         if let Some(result) = result {
             replies.ack(command.from, command.number, result);
+        }
+        let is_refused = matches!(result, Some(DENIED | TEMPORARILY_REJECTED));
+        if is_refused && command.energises() {
+            replies.tell_unfit();
         }
         if command.number == REQUEST_MESSAGE && result == Some(ACCEPTED) {
             replies.push(requested_message(command));

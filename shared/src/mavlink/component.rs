@@ -292,6 +292,11 @@ impl Component {
         self.replies.value(id);
     }
 
+    /// Has the next poll tell why the parameters make no drive, if they make none.
+    pub fn tell_unfit(&mut self) {
+        self.replies.tell_unfit();
+    }
+
     /// Reports the throttle wire's news.
     pub fn report_news(&mut self, news: News) {
         if let News::Calibration(step) = news {

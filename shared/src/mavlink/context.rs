@@ -30,7 +30,9 @@ pub struct Context<'a> {
     pub record: Option<&'a Record>,
     /// Decides whether the motor may turn.
     pub authority: &'a mut dyn Access,
-    /// Checks that values make a drive; a value that does not is refused with the reason.
+    /// Why the values in force make no drive: the motor is off.
+    pub unfit: Option<BuildError>,
+    /// Checks that values make a drive. While the motor turns, one that makes none is refused with the reason.
     pub validate: &'a dyn Fn(&Params) -> Result<(), BuildError>,
 }
 

@@ -101,20 +101,18 @@ fn take(id: ParamId, value: f32, stopped: bool, context: &mut Context) -> Result
         let reason = "not in this image";
         return Err(Refusal::new(OUT_OF_RANGE, reason));
     }
-    change(id, value, context)
-}
-
-/// Changes a value if it is in range and makes a drive.
-///
-/// Never inlined: a command calls it too.
-#[inline(never)]
-pub(super) fn change(id: ParamId, value: f32, context: &mut Context) -> Result<(), Refusal> {
     let mut params = context.params.clone();
     params.set(id, value)?;
-    (context.validate)(&params).map_err(|error| Refusal {
-        because: Some(error.param).filter(|param| *param != id),
-        ..Refusal::new(OUT_OF_RANGE, error.reason)
-    })?;
+    if let Some(reason) = id.beyond(value, context.board) {
+        return Err(Refusal::new(OUT_OF_RANGE, reason));
+    }
+    // At rest others may follow that it fits, in any order.
+    if !stopped {
+        (context.validate)(&params).map_err(|error| Refusal {
+            because: Some(error.param).filter(|param| *param != id),
+            ..Refusal::new(OUT_OF_RANGE, error.reason)
+        })?;
+    }
     *context.params = params;
     Ok(())
 }

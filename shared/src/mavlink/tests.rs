@@ -114,6 +114,7 @@ impl Bench {
             ..
         } = self;
         let check = Report::new(40.0, 0.02);
+        let unfit = refuse_low_limit(params).err();
         let mut context = Context {
             now_us: *now_us,
             params,
@@ -125,7 +126,8 @@ impl Bench {
             identification: &identify::Report::default(),
             record: None,
             authority,
-            validate: &refuse_slow_pwm,
+            unfit,
+            validate: &refuse_low_limit,
         };
         receiver.push(*now_us, bytes, |frame| {
             component.handle(frame, &mut context);
@@ -142,6 +144,7 @@ impl Bench {
     /// Collects the frames sent at this poll.
     fn poll_bytes(&mut self, frames: &mut Vec<Vec<u8>>) {
         let check = Report::new(40.0, 0.02);
+        let unfit = refuse_low_limit(&self.params).err();
         let mut context = Context {
             now_us: self.now_us,
             params: &mut self.params,
@@ -153,7 +156,8 @@ impl Bench {
             identification: &identify::Report::default(),
             record: None,
             authority: &mut self.authority,
-            validate: &refuse_slow_pwm,
+            unfit,
+            validate: &refuse_low_limit,
         };
         self.component.poll(&mut context, &mut |bytes| {
             frames.push(bytes.to_vec());
@@ -186,12 +190,12 @@ impl Bench {
 }
 
 /// A check like `build`'s: one parameter conflicts with another.
-fn refuse_slow_pwm(params: &Params) -> Result<(), BuildError> {
-    let slow = params.get(ParamId::PwmFreqHz) < 10_000.0;
-    if slow && params.get(ParamId::CtlBwCurHz) > 300.0 {
+fn refuse_low_limit(params: &Params) -> Result<(), BuildError> {
+    let low = params.get(ParamId::LimPhaseA) < 2.0;
+    if low && params.get(ParamId::CtlBwCurHz) > 300.0 {
         return Err(BuildError {
             param: ParamId::CtlBwCurHz,
-            reason: "too fast for the PWM frequency, lower it first",
+            reason: "too fast for so low a limit, lower it first",
         });
     }
     Ok(())

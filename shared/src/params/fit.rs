@@ -1,20 +1,25 @@
-//! What a board cannot do with stored parameters is brought within its bounds at the start.
+//! What a board cannot do: such a value is refused, and a stored one brought within the bounds at the start.
 
 use super::board::{Board, PwmBound};
 use super::table::ParamId;
 use super::values::Params;
+use crate::input::signal::Signal;
 
 impl Params {
-    /// Raises a dead time below the board's least, and lowers a supply's limit above its greatest and a PWM frequency above
-    /// the bound of what is in force. Returns the last of them that somebody has chosen, and why it is changed.
+    /// Returns the factory's values on a board.
+    pub fn factory(board: &Board) -> Self {
+        let mut params = Self::default();
+        params.fit(board);
+        params
+    }
+
+    /// Raises a dead time below the board's least, and lowers a supply's limit above its greatest. Returns the last of them
+    /// that somebody has chosen, and why it is changed.
     pub fn fit(&mut self, board: &Board) -> Option<(ParamId, &'static str)> {
         let (least, supply) = (board.least_dead_time, board.greatest_supply);
         let dead_time = self.hold(ParamId::PwmDeadtimeNs, (least.ns, f32::MAX), least.refusal);
         let supply = self.hold(ParamId::LimBusVMax, (0.0, supply.value), supply.refusal);
-        let pwm = self
-            .pwm_bound(board)
-            .and_then(|bound| self.hold(ParamId::PwmFreqHz, (0.0, bound.hz), bound.refusal));
-        pwm.or(supply).or(dead_time)
+        supply.or(dead_time)
     }
 
     /// Holds a value within bounds; returns the reason if that changes one that somebody has chosen.
@@ -42,5 +47,32 @@ impl Params {
                 _ => !six_step && self.get(id) == value && !id.lacks(value),
             }
         })
+    }
+}
+
+impl ParamId {
+    /// Returns why a board refuses this value, whatever the others are; its own range is not looked at.
+    pub fn beyond(self, value: f32, board: &Board) -> Option<&'static str> {
+        let number = value as u8;
+        let (is_beyond, refusal) = match self {
+            Self::LimPhaseA => (
+                value > board.greatest_phase.value,
+                board.greatest_phase.refusal,
+            ),
+            Self::LimBusVMax => (
+                value > board.greatest_supply.value,
+                board.greatest_supply.refusal,
+            ),
+            Self::PwmDeadtimeNs => (
+                value < board.least_dead_time.ns,
+                board.least_dead_time.refusal,
+            ),
+            Self::InpProto => (
+                number != 0 && Signal::from_number(number).is_none(),
+                "neither 0, 1 to 4, 10 to 13 nor 20 to 23",
+            ),
+            _ => (false, ""),
+        };
+        is_beyond.then_some(refusal)
     }
 }

@@ -161,8 +161,13 @@ fn a_barred_motor_is_not_energised() {
     let lost = |bench: &mut Bench| bench.esc.lose_stored();
     let unmeasured = |_: &mut Bench| {};
     let defect = |bench: &mut Bench| bench.test_itself_ms(&mut Bad::new(0), 10);
+    let unfit = |bench: &mut Bench| {
+        bench.set("CTL_BW_CUR_HZ", 2000.0);
+        bench.poll();
+    };
     type Act<'a> = &'a dyn Fn(&mut Bench);
-    let bars: [(&str, bool, Act); 3] = [
+    let bars: [(&str, bool, Act); 4] = [
+        ("parameters that do not fit", true, &unfit),
         ("settings lost", true, &lost),
         ("not measured yet", false, &unmeasured),
         ("a defect", false, &defect),

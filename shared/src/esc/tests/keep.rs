@@ -352,14 +352,14 @@ fn a_reset_to_the_factorys_settings_leaves_the_statistics_alone() {
         statistics,
         ..Kept::default()
     };
-    let Bench { esc, throttle, .. } = &mut bench;
-    esc.replace(throttle, &mut reset).expect("the defaults fit");
-    assert_eq!(esc.kept(), reset);
+    bench.esc.replace(&mut reset);
+    assert_eq!(bench.esc.kept(), reset);
     bench.wait_ms(1);
     assert_eq!(bench.esc.kept(), reset, "the key is gone with the replies");
     bench.command(STORAGE, 2.0);
     bench.wait_ms(1);
-    assert_eq!(bench.requests, [Request::FactoryReset]);
+    let requests = [Request::ParamsChanged, Request::FactoryReset];
+    assert_eq!(bench.requests, requests);
 }
 
 fn loaded(integrity: Integrity) -> Loaded {

@@ -7,7 +7,6 @@ use super::{
     Request, TEMPORARILY_REJECTED,
 };
 use crate::input::authority::TestError;
-use crate::mavlink::parameter;
 use crate::params::choice::Inp3d;
 use crate::params::{ParamId, Params};
 
@@ -79,9 +78,8 @@ impl Commands {
             self.act = (action == Some(BEEP)).then_some(Act::Beep);
             return Some(ACCEPTED);
         };
-        if parameter::change(id, value, context).is_err() {
-            return Some(DENIED);
-        }
+        // Both are in range.
+        let _ = context.params.set(id, value);
         replies.value(id);
         self.params_changed = true;
         self.storage = Some(*command);

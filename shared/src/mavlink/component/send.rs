@@ -42,6 +42,14 @@ impl Component {
         if core::mem::take(&mut self.unsign) {
             self.keep_signing(None);
         }
+        if self.replies.take_unfit()
+            && let Some(error) = context.unfit
+        {
+            let name = error.param.entry().name;
+            let value = ftp::value(context.params.get(error.param));
+            let pieces = ["Motor off: ", name, " ", &value, error.reason];
+            self.text(MavSeverity::MAV_SEVERITY_WARNING, &pieces, send);
+        }
         if self.replies.take_overrun() {
             self.text(
                 MavSeverity::MAV_SEVERITY_WARNING,

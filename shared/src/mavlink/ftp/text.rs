@@ -3,6 +3,7 @@
 use super::sink::Sink;
 use super::view::View;
 use crate::drive::Fault;
+use crate::mavlink::Warning;
 
 /// `@SYS/faults.txt`: past faults, those that hold the bridge off, and limits that bind.
 pub(super) fn faults(view: &View, sink: &mut Sink) {
@@ -96,6 +97,17 @@ fn thousandths(number: f32, sink: &mut Sink) {
     digits[0] = b' ';
     digits.rotate_left(1);
     sink.put(&digits);
+}
+
+/// Returns a number with three decimals, and a space.
+pub(in crate::mavlink) fn value(number: f32) -> Warning {
+    let mut digits = [0; 16];
+    thousandths(number, &mut Sink::new(0, &mut digits));
+    let mut text = Warning::new();
+    for digit in digits.into_iter().take_while(|digit| *digit > 0) {
+        let _ = text.push(char::from(digit));
+    }
+    text
 }
 
 /// Writes a number in decimal. The core library's formatting would take 3 KB of the image.

@@ -50,7 +50,7 @@ fn acks(sent: &[Sent]) -> Vec<(u16, u8)> {
 }
 
 impl Bench {
-    fn command(&mut self, command: u16, params: &[f32]) -> Vec<Sent> {
+    pub(super) fn command(&mut self, command: u16, params: &[f32]) -> Vec<Sent> {
         self.receive(&long(ESC, command, params, 0));
         self.answers()
     }

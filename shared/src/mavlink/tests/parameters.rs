@@ -210,17 +210,74 @@ fn a_refused_value_is_answered_with_the_old_one_and_the_reason() {
     assert_eq!(bench.component.take_request(), None);
 }
 
+/// Another motor's parameters come one by one and in any order.
 #[test]
-fn a_value_that_makes_no_drive_is_refused_with_what_stands_against_it() {
+fn a_value_that_makes_no_drive_with_the_others_is_taken_at_rest() {
     let mut bench = Bench::new();
+    let sent = bench.ask(&set("LIM_PHASE_A", 1.5));
+    assert_eq!(sent.len(), 1);
+    assert_eq!(values(&sent), [(ParamId::LimPhaseA as u16, 1.5)]);
+    assert_eq!(bench.params.get(ParamId::LimPhaseA), 1.5);
+    assert_eq!(bench.component.take_request(), Some(Request::ParamsChanged));
+}
+
+/// What a board cannot have is refused at once, whatever the others are.
+#[test]
+fn a_value_beyond_the_board_is_refused_with_the_bound() {
+    let mut bench = Bench::new();
+    for (text, value, reason) in [
+        (
+            "LIM_PHASE_A",
+            30.0,
+            "its trip is beyond the current sensors' range",
+        ),
+        ("INP_PROTO", 7.0, "neither 0, 1 to 4, 10 to 13 nor 20 to 23"),
+    ] {
+        let id = ParamId::find(text).expect("in the table");
+        let before = bench.params.get(id);
+        let sent = bench.ask(&set(text, value));
+        assert_eq!(values(&sent), [(id as u16, before)]);
+        let out_of_range = MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE;
+        assert_eq!(refusal(&sent, id), out_of_range);
+        let whole: std::string::String = texts(&sent).concat();
+        assert_eq!(whole, std::format!("{text} refused: {reason}"));
+        assert_eq!(bench.component.take_request(), None);
+    }
+}
+
+#[test]
+fn what_would_have_the_motor_turn_is_refused_with_what_makes_no_drive() {
+    let mut bench = Bench::new();
+    bench.params.set(ParamId::LimPhaseA, 1.5).expect("in range");
+    let hz = bench.params.get(ParamId::CtlBwCurHz);
+    for (command, params) in [
+        (400, [1.0, 0.0]),
+        (310, [0.1, 9.0]),
+        (209, [1.0, 3.0]),
+        (31_010, [3.0, 0.0]),
+    ] {
+        let sent = bench.command(command, &params);
+        let whole: std::string::String = texts(&sent).concat();
+        let told = std::format!(
+            "Motor off: CTL_BW_CUR_HZ {hz:.3} too fast for so low a limit, lower it first"
+        );
+        assert!(whole.ends_with(&told), "{command}: {whole}");
+    }
+}
+
+#[test]
+fn a_value_that_makes_no_drive_is_refused_while_the_motor_turns() {
+    let mut bench = Bench::new();
+    bench.telemetry.phase = Phase::Run;
+    bench.telemetry.rpm = 3000.0;
     let before = bench.params.clone();
-    let sent = bench.ask(&set("PWM_FREQ_HZ", 9000.0));
+    let sent = bench.ask(&set("LIM_PHASE_A", 1.5));
     assert_eq!(
         values(&sent),
-        [(ParamId::PwmFreqHz as u16, before.get(ParamId::PwmFreqHz))]
+        [(ParamId::LimPhaseA as u16, before.get(ParamId::LimPhaseA))]
     );
     assert_eq!(
-        refusal(&sent, ParamId::PwmFreqHz),
+        refusal(&sent, ParamId::LimPhaseA),
         MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
     );
     assert_eq!(bench.params, before);
@@ -232,7 +289,7 @@ fn a_value_that_makes_no_drive_is_refused_with_what_stands_against_it() {
     let whole: std::string::String = texts(&sent).concat();
     assert_eq!(
         whole,
-        "PWM_FREQ_HZ refused: CTL_BW_CUR_HZ: too fast for the PWM frequency, lower it first"
+        "LIM_PHASE_A refused: CTL_BW_CUR_HZ: too fast for so low a limit, lower it first"
     );
     assert_eq!(chunks.len(), 2);
     for (i, chunk) in chunks.iter().enumerate() {

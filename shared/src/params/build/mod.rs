@@ -37,7 +37,6 @@ use crate::control::low_speed;
 use crate::control::modulator::{self, Modulation};
 use crate::control::sensing::Shunts;
 use crate::drive::{Config, Direction, Drift, Stop, Thresholds};
-use crate::input::signal::Signal;
 use crate::math::Real;
 use crate::parts;
 use crate::protection;
@@ -283,21 +282,17 @@ fn refuse_contradictions(p: &Si) {
         ParamId::CtlBwSpdHz,
         "above a fifth of CTL_BW_CUR_HZ",
     );
-    let (phase, supply) = (p.board.greatest_phase, p.board.greatest_supply);
-    above(p.limit_a, phase.value, ParamId::LimPhaseA, phase.refusal);
-    above(
-        supply_max_v,
-        supply.value,
+    for id in [
+        ParamId::LimPhaseA,
         ParamId::LimBusVMax,
-        supply.refusal,
-    );
-    above(p.fastest_turns, 0.25, ParamId::PwmFreqHz, TOO_FEW_PERIODS);
-    above(
-        p.board.least_dead_time.ns,
-        p.get(ParamId::PwmDeadtimeNs),
         ParamId::PwmDeadtimeNs,
-        p.board.least_dead_time.refusal,
-    );
+        ParamId::InpProto,
+    ] {
+        if let Some(refusal) = id.beyond(p.get(id), p.board) {
+            p.refuse_if(true, id, refusal);
+        }
+    }
+    above(p.fastest_turns, 0.25, ParamId::PwmFreqHz, TOO_FEW_PERIODS);
     if p.chosen(CtlObserver::FluxCrossings) || p.chosen(CtlObserver::Hall) {
         above(
             p.fastest_turns,
@@ -310,12 +305,6 @@ fn refuse_contradictions(p: &Si) {
         let pwm_hz = p.get(ParamId::PwmFreqHz);
         above(pwm_hz, bound.hz, ParamId::PwmFreqHz, bound.refusal);
     }
-    let protocol = p.params.number(ParamId::InpProto);
-    p.refuse_if(
-        protocol != 0 && Signal::from_number(protocol).is_none(),
-        ParamId::InpProto,
-        "neither 0, 1 to 4, 10 to 13 nor 20 to 23",
-    );
 }
 
 /// Returns the least voltage along q in voltage mode.

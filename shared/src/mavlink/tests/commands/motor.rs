@@ -218,9 +218,4 @@ fn nothing_is_configured_that_is_not_known_not_this_motor_or_turns() {
     assert_eq!(bench.params, before);
     assert_eq!(bench.component.take_act(), None);
     assert_eq!(bench.component.take_request(), None);
-
-    // Makes no drive: these parameters conflict whatever else is set.
-    bench.set(ParamId::PwmFreqHz, 9000.0);
-    assert_eq!(bench.result(311, &[2.0]), DENIED as u8);
-    assert_eq!(bench.params.get(ParamId::Inp3d), 0.0);
 }
