@@ -3,6 +3,7 @@
 use std::fs;
 use std::io::Write;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use serde_json::{Map, Value};
 
@@ -16,6 +17,9 @@ use crate::param_load::{load, same};
 use crate::param_text;
 use crate::params::{self, Param, SetOutcome, Storage};
 use crate::session::Session;
+
+/// How long to wait for what the ESC says of the parameters together.
+const TOLD_AFTER: Duration = Duration::from_millis(800);
 
 /// Parameter work with checked input, so that nothing is sent if any of it is bad.
 pub(crate) enum Task<'a> {
@@ -166,6 +170,7 @@ impl<'a> Task<'a> {
             }
             Self::Set { params, store } => {
                 let refused = set(session, &params, out, complaints)?;
+                tell_unfit(session, complaints)?;
                 finish(session, store, refused, params.len(), out)
             }
             Self::Save { file } => {
@@ -178,10 +183,24 @@ impl<'a> Task<'a> {
             Self::Load { file, lines, store } => {
                 let lines = param_file::for_component(file, lines, session.target().component)?;
                 let refused = load(session, &lines, out, complaints)?;
+                tell_unfit(session, complaints)?;
                 finish(session, store, refused, lines.len(), out)
             }
         }
     }
+}
+
+/// Waits for what the ESC says of the parameters together, half a second after the last: with some, its motor stays off.
+fn tell_unfit(session: &mut Session, complaints: &mut dyn Write) -> Result<(), Error> {
+    session.forget_texts();
+    let deadline = Instant::now() + TOLD_AFTER;
+    while session.hear(deadline)? {
+        if let Some(text) = session.texts(&["Motor off: "]).pop() {
+            writeln!(complaints, "{text}")?;
+            break;
+        }
+    }
+    Ok(())
 }
 
 /// Returns the name as an ESC has it: it may be typed in any case.

@@ -21,48 +21,34 @@ pub(crate) fn load(
         .into_iter()
         .map(|p| (p.name, p.value))
         .collect();
-    let mut equal = 0;
-    let mut changed = 0;
+    let (mut equal, mut changed) = (0, 0);
     let mut refused: Vec<(&Line, String)> = Vec::new();
-    let mut open: Vec<&Line> = Vec::new();
     for line in lines {
-        match present.get(&line.param.name) {
+        let Param { name, value } = &line.param;
+        match present.get(name) {
             None => refused.push((line, "no such parameter".into())),
-            Some(now) if same(*now, line.param.value) => equal += 1,
-            Some(_) => open.push(line),
-        }
-    }
-
-    // A value may be refused only because another, further down, is still the old one; and a derived one,
-    // which is never accepted, may have become right meanwhile. So retry the refused ones as long as that
-    // makes progress.
-    let mut again = false;
-    loop {
-        let before = open.len();
-        let mut left = Vec::new();
-        for line in open {
-            let Param { name, value } = &line.param;
-            if again && same(params::get(session, name)?, *value) {
-                equal += 1;
-                continue;
-            }
-            match params::set(session, name, *value)? {
+            Some(now) if same(*now, *value) => equal += 1,
+            Some(_) => match params::set(session, name, *value)? {
                 SetOutcome::Taken => {
                     changed += 1;
                     print(std::slice::from_ref(&line.param), false, out)?;
                 }
-                SetOutcome::Refused(reason) => left.push((line, reason)),
-            }
+                SetOutcome::Refused(reason) => refused.push((line, reason)),
+            },
         }
-        if left.is_empty() || left.len() == before {
-            refused.extend(left);
-            break;
-        }
-        open = left.into_iter().map(|(line, _)| line).collect();
-        again = true;
     }
 
-    refused.sort_by_key(|(line, _)| line.number);
+    // A derived value is never accepted, and has become right by those that it follows from.
+    let mut left = Vec::new();
+    for (line, reason) in refused {
+        let Param { name, value } = &line.param;
+        if present.contains_key(name) && same(params::get(session, name)?, *value) {
+            equal += 1;
+        } else {
+            left.push((line, reason));
+        }
+    }
+    let refused = left;
     for (line, reason) in &refused {
         let Param { name, value } = &line.param;
         let remedy = param_text::remedy(name, *value);

@@ -104,11 +104,6 @@ fn set_reports_each_value_and_the_reason_of_each_refusal() {
         ),
         ("MOT_KV", "100", "read-only"),
         ("MOT_POLE_PAIRS", "6.5", "whole number; it stays 0"),
-        (
-            "CTL_RPM_MIN",
-            "7000",
-            "must be below CTL_RPM_MAX; it stays 300",
-        ),
         ("NO_SUCH", "1", "no such parameter"),
     ] {
         let run = esc.siskin(&["params", "set", "--store", name, value]);
@@ -124,6 +119,20 @@ fn set_reports_each_value_and_the_reason_of_each_refusal() {
     assert_eq!(outcome.saves, 1);
     assert_eq!(outcome.params.get(ParamId::LimPhaseA), 15.5);
     assert_eq!(outcome.params.get(ParamId::MotStop), 0.0);
+}
+
+/// It is taken, since others may follow, but the motor is off until they do.
+#[test]
+fn what_makes_no_drive_with_the_others_is_told() {
+    let esc = Esc::start(Behaviour::default());
+    let run = esc.siskin(&["params", "set", "CTL_RPM_MIN", "7000"]);
+    ended(&run, 0);
+    let told = "Motor off: CTL_RPM_MIN 7000.000 must be below CTL_RPM_MAX";
+    assert!(run.err.contains(told), "{}", run.err);
+    let run = esc.siskin(&["params", "set", "CTL_RPM_MIN", "300"]);
+    ended(&run, 0);
+    assert_eq!(run.err, "");
+    esc.stop();
 }
 
 #[test]

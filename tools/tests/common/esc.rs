@@ -148,6 +148,9 @@ impl Loss {
     }
 }
 
+/// Time after the last change at which the ESC tells what does not fit.
+const QUIET: Duration = Duration::from_millis(500);
+
 /// A rule that ties two parameters, like those of the drive's configuration.
 fn validate(params: &Params) -> Result<(), BuildError> {
     if params.get(ParamId::CtlRpmMin) < params.get(ParamId::CtlRpmMax) {
@@ -180,6 +183,7 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
         seen: 0,
     };
     let mut saves = 0;
+    let mut changed: Option<Instant> = None;
     while !stop.load(Ordering::Relaxed) {
         let now_us = u64::try_from(started.elapsed().as_micros()).expect("short");
         let telemetry = Telemetry {
@@ -192,6 +196,7 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
             bad_frames: 7,
             ..Telemetry::new()
         };
+        let unfit = validate(&params).err();
         let mut context = Context {
             now_us,
             params: &mut params,
@@ -202,6 +207,7 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
             identification: &siskin_control::identify::Report::default(),
             record: None,
             authority: &mut authority,
+            unfit,
             validate: &validate,
         };
 
@@ -234,6 +240,10 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
                 component.handle(frame, &mut context);
             }
         });
+        if changed.is_some_and(|at| at.elapsed() > QUIET) {
+            changed = None;
+            component.tell_unfit();
+        }
         let mut sent = Vec::new();
         component.poll(&mut context, &mut |frame| {
             let id = u32::from_le_bytes([frame[7], frame[8], frame[9], 0]);
@@ -243,7 +253,7 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
         });
         while let Some(request) = component.take_request() {
             match request {
-                Request::ParamsChanged => {}
+                Request::ParamsChanged => changed = Some(Instant::now()),
                 Request::Save => {
                     saves += 1;
                     component.storage_done(behaviour.storage_fault.map_or(Ok(()), Err));
