@@ -121,7 +121,7 @@ impl Esc {
         (esc, throttle)
     }
 
-    /// Creates an ESC at power-up without its throttle, which is made from [`Esc::running`].
+    /// Creates an ESC at power-up without its throttle.
     ///
     /// Never inlined: on the chip this and [`Throttle::new`] construct in place, since moving the two through
     /// [`Esc::new`] takes 10 KB of stack.

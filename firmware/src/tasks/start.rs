@@ -42,7 +42,7 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
         esc.warn_of(text);
     }
     recall_rest(esc, &mut hardware.flash);
-    let mut port = open_port(esc);
+    let mut port = open_port(esc.params());
     let reset = chip::take_reset();
     if !reset.power_up {
         port.lock(Throttle::resume);
@@ -151,9 +151,11 @@ fn recall_rest(esc: &mut Esc, flash: &mut Storage) {
     esc.recall(&store::load(flash, range()));
 }
 
+/// Parameters that do not fit will do: the motor is off, and the wire follows once they are replaced. A copy of those in
+/// force instead would take 0.2 KB of stack more.
 #[inline(never)] // its stack is free for what comes next
-fn open_port(esc: &Esc) -> Port {
-    Port::open(|| Throttle::new(TICK_HZ, &esc.running(), &board()))
+fn open_port(params: &Params) -> Port {
+    Port::open(|| Throttle::new(TICK_HZ, params, &board()))
 }
 
 /// Starts the control interrupt with the parameters' configuration.
