@@ -420,7 +420,6 @@ impl Esc {
             identification: &self.identify.report,
             record: self.record,
             authority: &mut LockedAuthority(throttle),
-            unfit: self.unfit,
             validate: &|params| overrides.check(params, &board),
         };
         run(&mut self.component, &mut context);

@@ -22,7 +22,7 @@ impl Esc {
                 if let Some(text) = self.misfits() {
                     self.warn(text);
                 }
-                self.component.tell_unfit();
+                self.tells_us = 0;
                 self.component.check_done(passed && self.unfit.is_none());
             }
         }

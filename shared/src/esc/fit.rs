@@ -5,6 +5,7 @@ use core::mem::MaybeUninit;
 
 use super::Esc;
 use crate::drive::{Config, Drift, put_default};
+use crate::mavlink::digits;
 use crate::params::{Board, BuildError, ParamId, Params, build_in, scale};
 use crate::units::Scale;
 
@@ -145,9 +146,13 @@ impl Esc {
 
     /// Tells the user what does not fit once that is due.
     pub(super) fn tell_unfit(&mut self, now_us: u64) {
-        if now_us >= self.tells_us {
-            self.tells_us = u64::MAX;
-            self.component.tell_unfit();
+        if now_us < self.tells_us {
+            return;
+        }
+        self.tells_us = u64::MAX;
+        if let Some(BuildError { param, reason }) = self.unfit {
+            let value = digits(self.params.get(param));
+            self.warn_in_pieces("Motor off: ", [param.entry().name, &value, reason]);
         }
     }
 }

@@ -27,7 +27,7 @@ impl Esc {
             self.identify(now_us, true);
         } else {
             self.warn_of("Not identified: fault, defect, settings lost");
-            self.component.tell_unfit();
+            self.tells_us = now_us;
         }
     }
 

@@ -451,7 +451,7 @@ fn the_stick_calibrates_and_the_ends_are_stored() {
         bench.texts.last().map(String::as_str),
         Some("Parameters stored")
     );
-    bench.pulses(1, 1912);
+    bench.pulses(4, 1912);
     let Setpoint::Speed(speed) = bench.throttle.setpoint() else {
         panic!("it turns");
     };

@@ -41,6 +41,7 @@ impl Esc {
             Act::Check => self.check.begin(),
             Act::Identify => self.identify(now_us, false),
             Act::EndIdentification => self.end_identification("cancelled"),
+            Act::SayWhyOff => self.tells_us = now_us,
             Act::AbandonIdentification => self.end_identification("its client is gone"),
             Act::KeepIdentified => {
                 let kept = self.keep_identified();
@@ -57,7 +58,8 @@ impl Esc {
             }
             // Lowering it would not arm it.
             News::OpenThrottle if self.unfit.is_some() => {
-                return self.component.tell_unfit();
+                self.tells_us = now_us;
+                return;
             }
             news => news,
         };

@@ -243,7 +243,7 @@ impl Commands {
         }
         let is_refused = matches!(result, Some(DENIED | TEMPORARILY_REJECTED));
         if is_refused && command.energises() {
-            replies.tell_unfit();
+            self.act = self.act.or(Some(Act::SayWhyOff));
         }
         if command.number == REQUEST_MESSAGE && result == Some(ACCEPTED) {
             replies.push(requested_message(command));

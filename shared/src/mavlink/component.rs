@@ -191,7 +191,7 @@ impl Component {
         let signing = &mut self.writer.sender.signing;
         let is_time = signing.set_up(frame.bytes(10), frame.u64(0));
         let (severity, text) = if !is_time {
-            let text = "Signing refused: time too far ahead";
+            let text = "Signing refused: time is far ahead";
             (MavSeverity::MAV_SEVERITY_WARNING, text)
         } else if signing.signs() {
             let text = "Signing: changes need the key";
@@ -290,11 +290,6 @@ impl Component {
     /// Like [`Component::changed`], for a value that does not affect the configuration.
     pub fn report_value(&mut self, id: ParamId) {
         self.replies.value(id);
-    }
-
-    /// Has the next poll tell why the parameters make no drive, if they make none.
-    pub fn tell_unfit(&mut self) {
-        self.replies.tell_unfit();
     }
 
     /// Reports the throttle wire's news.

@@ -30,8 +30,6 @@ pub struct Context<'a> {
     pub record: Option<&'a Record>,
     /// Decides whether the motor may turn.
     pub authority: &'a mut dyn Access,
-    /// Why the values in force make no drive: the motor is off.
-    pub unfit: Option<BuildError>,
     /// Checks that values make a drive. While the motor turns, one that makes none is refused with the reason.
     pub validate: &'a dyn Fn(&Params) -> Result<(), BuildError>,
 }
@@ -84,6 +82,8 @@ pub enum Act {
     EndIdentification,
     /// End it since the client that began it is gone.
     AbandonIdentification,
+    /// Say why the parameters keep the motor off, if they do.
+    SayWhyOff,
     /// Keep its results; [`Component::identification_done`](super::Component::identification_done) reports it.
     KeepIdentified,
     /// Begin a self-test; [`Component::report_progress`](super::Component::report_progress) and

@@ -37,7 +37,7 @@ pub(super) fn words(news: News) -> Option<(MavSeverity, [&'static str; 2])> {
                     Step::Done(_) => "both ends taken",
                     Step::Again => "lower it to identify",
                     Step::Identify => "over",
-                    Step::Cancelled => "given up, nothing changed",
+                    Step::Cancelled => "given up",
                 },
             ],
         ),

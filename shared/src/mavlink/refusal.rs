@@ -35,7 +35,7 @@ impl From<SetError> for Refusal {
         let (error, reason) = match error {
             SetError::NotFinite => (OUT_OF_RANGE, "not a finite number"),
             SetError::OutOfRange => (OUT_OF_RANGE, "out of range"),
-            SetError::NotWhole => (OUT_OF_RANGE, "must be a whole number"),
+            SetError::NotWhole => (OUT_OF_RANGE, "not a whole number"),
             SetError::ReadOnly => (READ_ONLY, "read-only"),
         };
         Self::new(error, reason)

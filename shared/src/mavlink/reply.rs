@@ -79,7 +79,6 @@ pub(super) struct Replies {
     queue: Deque<Reply, WAITING>,
     values: [bool; TABLE.len()],
     overrun: bool,
-    unfit: bool,
 }
 
 impl Replies {
@@ -88,7 +87,6 @@ impl Replies {
             queue: Deque::new(),
             values: [false; TABLE.len()],
             overrun: false,
-            unfit: false,
         }
     }
 
@@ -125,16 +123,6 @@ impl Replies {
             result: MavResult::MAV_RESULT_IN_PROGRESS,
             progress: percent,
         });
-    }
-
-    /// Has the next poll tell why the parameters make no drive, if they make none.
-    pub(super) fn tell_unfit(&mut self) {
-        self.unfit = true;
-    }
-
-    /// Returns true if that is to be told.
-    pub(super) fn take_unfit(&mut self) -> bool {
-        core::mem::take(&mut self.unfit)
     }
 
     pub(super) fn value(&mut self, id: ParamId) {

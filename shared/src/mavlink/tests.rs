@@ -114,7 +114,6 @@ impl Bench {
             ..
         } = self;
         let check = Report::new(40.0, 0.02);
-        let unfit = refuse_low_limit(params).err();
         let mut context = Context {
             now_us: *now_us,
             params,
@@ -126,7 +125,6 @@ impl Bench {
             identification: &identify::Report::default(),
             record: None,
             authority,
-            unfit,
             validate: &refuse_low_limit,
         };
         receiver.push(*now_us, bytes, |frame| {
@@ -144,7 +142,6 @@ impl Bench {
     /// Collects the frames sent at this poll.
     fn poll_bytes(&mut self, frames: &mut Vec<Vec<u8>>) {
         let check = Report::new(40.0, 0.02);
-        let unfit = refuse_low_limit(&self.params).err();
         let mut context = Context {
             now_us: self.now_us,
             params: &mut self.params,
@@ -156,7 +153,6 @@ impl Bench {
             identification: &identify::Report::default(),
             record: None,
             authority: &mut self.authority,
-            unfit,
             validate: &refuse_low_limit,
         };
         self.component.poll(&mut context, &mut |bytes| {

@@ -3,7 +3,7 @@
 use heapless::String;
 
 /// A text composed at run time: what was tried, a parameter and a reason. Beyond 50 letters it takes two STATUSTEXTs.
-pub type Warning = String<76>;
+pub type Warning = String<92>;
 
 /// The pending warnings, at most two, and the last one for later readers.
 #[derive(Clone, Debug)]

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use siskin_control::check::Report;
 use siskin_control::control::delay::Delay;
 use siskin_control::input::authority::{Authority, Timing};
-use siskin_control::mavlink::{Component, Context, Frame, Receiver, Request};
+use siskin_control::mavlink::{Component, Context, Frame, Receiver, Request, Warning, digits};
 use siskin_control::params::{BuildError, ParamId, Params};
 use siskin_control::telemetry::Telemetry;
 use siskin_emulator::plant::Sensing;
@@ -196,7 +196,6 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
             bad_frames: 7,
             ..Telemetry::new()
         };
-        let unfit = validate(&params).err();
         let mut context = Context {
             now_us,
             params: &mut params,
@@ -207,7 +206,6 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
             identification: &siskin_control::identify::Report::default(),
             record: None,
             authority: &mut authority,
-            unfit,
             validate: &validate,
         };
 
@@ -242,7 +240,19 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
         });
         if changed.is_some_and(|at| at.elapsed() > QUIET) {
             changed = None;
-            component.tell_unfit();
+            if let Err(error) = validate(context.params) {
+                let value = digits(context.params.get(error.param));
+                let mut text = Warning::new();
+                for piece in [
+                    "Motor off: ",
+                    error.param.entry().name,
+                    &value,
+                    error.reason,
+                ] {
+                    text.push_str(piece).expect("there is room");
+                }
+                component.warn(text);
+            }
         }
         let mut sent = Vec::new();
         component.poll(&mut context, &mut |frame| {

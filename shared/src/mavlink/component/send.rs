@@ -42,9 +42,6 @@ impl Component {
         if core::mem::take(&mut self.unsign) {
             self.keep_signing(None);
         }
-        if self.replies.take_unfit() {
-            self.tell_why_off(context, send);
-        }
         if self.replies.take_overrun() {
             self.text(
                 MavSeverity::MAV_SEVERITY_WARNING,
@@ -260,15 +257,6 @@ impl Component {
         let payload = ftp::metadata(id, now_us);
         let sender = &mut self.writer.sender;
         sender.send_payload(self.identity.address, message, &payload, send);
-    }
-
-    #[inline(never)] // as above
-    fn tell_why_off(&mut self, context: &Context, send: &mut dyn FnMut(&[u8])) {
-        let Some(error) = context.unfit else { return };
-        let name = error.param.entry().name;
-        let value = ftp::value(context.params.get(error.param));
-        let pieces = ["Motor off: ", name, " ", &value, error.reason];
-        self.text(MavSeverity::MAV_SEVERITY_WARNING, &pieces, send);
     }
 
     fn send_value(&mut self, context: &Context, id: ParamId, send: &mut dyn FnMut(&[u8])) {

@@ -31,7 +31,7 @@ pub(super) use answer::{Answer, PAYLOAD_MAX};
 pub use files::PARAMETER_METADATA;
 pub(super) use metadata::{is_metadata, metadata};
 pub(super) use server::Server;
-pub(super) use text::value;
+pub use text::digits;
 pub(super) use view::View;
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! Texts, and numbers in decimal.
 
+use heapless::String;
+
 use super::sink::Sink;
 use super::view::View;
 use crate::drive::Fault;
-use crate::mavlink::Warning;
 
 /// `@SYS/faults.txt`: past faults, those that hold the bridge off, and limits that bind.
 pub(super) fn faults(view: &View, sink: &mut Sink) {
@@ -99,13 +100,14 @@ fn thousandths(number: f32, sink: &mut Sink) {
     sink.put(&digits);
 }
 
-/// Returns a number with three decimals, and a space.
-pub(in crate::mavlink) fn value(number: f32) -> Warning {
-    let mut digits = [0; 16];
-    thousandths(number, &mut Sink::new(0, &mut digits));
-    let mut text = Warning::new();
-    for digit in digits.into_iter().take_while(|digit| *digit > 0) {
-        let _ = text.push(char::from(digit));
+/// Returns a number with three decimals, between spaces.
+pub fn digits(number: f32) -> String<16> {
+    let mut bytes = [0; 15];
+    thousandths(number, &mut Sink::new(0, &mut bytes));
+    let mut text = String::new();
+    let _ = text.push(' ');
+    for byte in bytes.into_iter().take_while(|byte| *byte > 0) {
+        let _ = text.push(char::from(byte));
     }
     text
 }

@@ -445,7 +445,7 @@ fn what_the_wire_tells_is_told_in_words() {
         ),
         (
             News::Calibration(Step::Cancelled),
-            &["Stick calibration: given up, nothing changed"],
+            &["Stick calibration: given up"],
         ),
         (News::Armed, &[]),
     ] {

@@ -28,6 +28,7 @@ fn a_self_test_is_acknowledged_step_by_step() {
         assert_eq!(bench.result(245, &[1.0]), REJECTED as u8);
         let test = [0.1, 1.0, 0.0, 0.0, 1.0];
         assert_eq!(bench.result(310, &test), REJECTED as u8);
+        assert_eq!(bench.component.take_act(), Some(Act::SayWhyOff));
         assert_eq!(bench.result(241, &[0.0; 7]), ACCEPTED as u8);
         bench.component.report_stored(Ok(()));
         assert_eq!(acks(&bench.answers()), []);
