@@ -37,6 +37,7 @@ mod kept;
 mod observe;
 mod storage;
 mod tunes;
+mod unfit;
 mod wire;
 
 pub use fit::{PowerUp, check};
