@@ -3,7 +3,7 @@
 //! DShot and pulses each have a candidate, with the evidence for and against it. The candidate that lasts is
 //! the signal.
 
-use super::event::{Event, Likeness};
+use super::event::Event;
 use super::signal::Signal;
 
 /// Hits needed to accept a signal, along with the time below. At 50 Hz four pulses take 60 ms, and the first
@@ -88,13 +88,11 @@ impl Detector {
     /// Weighs an event of the pulse decoder, and returns it if it should be passed on.
     pub(super) fn pulse(&mut self, at_ticks: u32, event: Event) -> Option<Event> {
         let before = self.pulses.take();
-        if let Event::Pulse { kind, likeness, .. } = event {
+        if let Event::Pulse { kind, near, .. } = event {
             let signal = Signal::Pulse(kind);
             // Pulses have no checksum, so nothing may count against them.
             let same = before.filter(|pulses| {
-                pulses.signal == signal
-                    && pulses.lasts(at_ticks, self.gap_ticks)
-                    && likeness == Likeness::Both
+                pulses.signal == signal && pulses.lasts(at_ticks, self.gap_ticks) && near
             });
             let candidate = same.map_or(Candidate::new(signal, at_ticks), |pulses| {
                 pulses.hit(at_ticks)

@@ -32,6 +32,9 @@ pub enum Event {
         width_ns: u32,
         /// What it has in common with the pulse before it.
         likeness: Likeness,
+        /// Its width is no further from that one's than a stick moves, end to end in 0.16 s at 50 Hz: an eighth of the
+        /// range. Enough to tell the kind, not to trust it.
+        near: bool,
     },
     /// Edges that were neither.
     Bad,

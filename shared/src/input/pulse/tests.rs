@@ -30,8 +30,9 @@ impl Wire {
         assert_eq!(self.decoder.edge(self.now, true), None);
         self.now = self.now.wrapping_add(width);
         let mut event = self.decoder.edge(self.now, false);
-        if let Some(Event::Pulse { likeness, .. }) = &mut event {
+        if let Some(Event::Pulse { likeness, near, .. }) = &mut event {
             self.likeness = core::mem::replace(likeness, Likeness::Neither);
+            *near = false;
         }
         event
     }
@@ -42,6 +43,7 @@ fn pulse(kind: Pulse, width_ns: u32) -> Option<Event> {
         kind,
         width_ns,
         likeness: Likeness::Neither,
+        near: false,
     })
 }
 

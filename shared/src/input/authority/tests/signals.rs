@@ -8,6 +8,7 @@ fn pulse(width_us: u32) -> Event {
         kind: Pulse::Servo,
         width_ns: width_us * 1000,
         likeness: Likeness::Both,
+        near: true,
     }
 }
 
