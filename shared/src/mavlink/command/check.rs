@@ -59,7 +59,7 @@ impl Commands {
         };
         if result == TEMPORARILY_REJECTED {
             let reason = if barred {
-                "settings lost or unfit"
+                "settings lost, unfit"
             } else if drive.faulted {
                 "a fault holds"
             } else if !drive.stopped {
