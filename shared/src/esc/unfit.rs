@@ -3,7 +3,7 @@
 
 use super::Esc;
 use crate::mavlink::digits;
-use crate::params::{BuildError, ParamId, Params};
+use crate::params::{BuildError, Params};
 
 /// How long no parameter must have changed before the user is told that they do not fit, µs: while a file is loaded,
 /// that may pass.
