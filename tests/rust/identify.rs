@@ -13,7 +13,6 @@ use siskin_control::drive::Phase;
 use siskin_control::params::ParamId;
 use siskin_emulator::bench::library;
 use siskin_emulator::device::Start;
-use siskin_emulator::fault::{Fault, Kind};
 use siskin_emulator::scenario::stand;
 use station::{HALF, Station, ZERO};
 
@@ -344,37 +343,6 @@ fn it_ends_by_command_by_disarming_and_by_the_throttle_and_sets_nothing() {
             station.run(10, Some(ZERO));
             assert_eq!(last(&station), MavResult::MAV_RESULT_FAILED);
             assert_eq!(station.texts, ["Not kept: nothing is identified"]);
-        }
-    }
-}
-
-/// The excitation regulates what the sensors read: one that is stuck must not let the others' current rise.
-#[test]
-fn a_stuck_current_sensor_ends_it_before_the_windings_carry_more_than_the_limit() {
-    for (phase, reads_a) in [(0, 0.0), (0, -5.0), (1, 3.0), (2, -20.0), (2, 8.0)] {
-        for at_s in [0.0, 1.5, 2.5, 3.5, 4.5] {
-            let stuck = Fault {
-                at_s,
-                for_s: None,
-                kind: Kind::SensorStuck(phase, reads_a),
-            };
-            let mut station = bench(
-                Start {
-                    faults: vec![stuck],
-                    ..Start::default()
-                },
-                &[],
-            );
-            let limit_a = f64::from(station.device.esc().params().get(ParamId::LimPhaseA));
-            station.ask(IDENTIFY, BEGIN);
-            station.run(7_000, None);
-            let case = (phase, reads_a, at_s, &station.texts);
-            assert!(
-                station.current_a < limit_a,
-                "{} A: {case:?}",
-                station.current_a
-            );
-            assert!(!has_said(&station, "Identification: done"), "{case:?}");
         }
     }
 }

@@ -1,5 +1,5 @@
 //! The self-test by command, on the emulated ESC: a sound one passes, each defect is named, the motor does
-//! not turn, and it runs only when a motor may be turned.
+//! not turn, and it runs only when a motor may be turned. An identification ends at a defect, too.
 
 mod station;
 
@@ -173,4 +173,36 @@ fn it_is_done_at_rest_alone_and_ends_with_any_throttle() {
     let rejected = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
     assert_eq!(station.acks, [(rejected, 0)]);
     assert_eq!(station.pulls, 0);
+}
+
+/// An identification's excitation regulates what the sensors read: one that is stuck must not let the others' current rise.
+#[test]
+fn a_stuck_current_sensor_ends_an_identification_before_the_windings_carry_more_than_the_limit() {
+    for (phase, reads_a) in [(0, 0.0), (0, -5.0), (1, 3.0), (2, -20.0), (2, 8.0)] {
+        for at_s in [0.0, 1.5, 2.5, 3.5, 4.5] {
+            let stuck = Fault {
+                at_s,
+                for_s: None,
+                kind: Kind::SensorStuck(phase, reads_a),
+            };
+            let mut station = Station::new(Start {
+                faults: vec![stuck],
+                ..Start::default()
+            });
+            let limit_a = f64::from(station.device.esc().params().get(ParamId::LimPhaseA));
+            station.ask(MavCmd::MAV_CMD_USER_1, 1.0);
+            station.run(7_000, None);
+            let case = (phase, reads_a, at_s, &station.texts);
+            assert!(
+                station.current_a < limit_a,
+                "{} A: {case:?}",
+                station.current_a
+            );
+            let done = station
+                .texts
+                .iter()
+                .any(|text| text == "Identification: done");
+            assert!(!done, "{case:?}");
+        }
+    }
 }
