@@ -40,7 +40,7 @@ pub(super) struct Standing {
     /// The identified signal, while present.
     pub(super) signal: Option<Signal>,
     pub(super) armed: bool,
-    /// There were edges in the last second, and no frame or pulse in them.
+    /// There is no signal, and most of the last second's edges were neither frame nor pulse.
     pub(super) unknown: bool,
     /// The wire demands throttle without being armed, and it is not a calibration.
     pub(super) open: bool,

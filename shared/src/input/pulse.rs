@@ -22,6 +22,10 @@ const ALIKE_PART: u32 = 16;
 /// late.
 const LATE_PART: u32 = 2;
 
+/// Pulses in a row that are alike in width and not in time, after which their period is the sender's: it has another
+/// rate now. Random widths do not last as long.
+const NEW_RATE: u8 = 16;
+
 /// log2 of the number of alike periods in their mean.
 const MEAN_SHIFT: u32 = 3;
 
@@ -71,6 +75,8 @@ struct Before {
     width: u32,
     /// The mean period of its sender's pulses, `None` before the second: what comes at another rate is another's.
     mean: Option<u32>,
+    /// Pulses in a row that were alike in width and not in time.
+    odd: u8,
 }
 
 impl Decoder {
@@ -126,7 +132,12 @@ impl Decoder {
     /// Compares the latest pulse with the one before it, and keeps it for the next.
     fn likeness(&mut self, width: u32, alike: u32) -> Likeness {
         let period = self.spacing.map(|spacing| spacing.period);
-        let Some(before) = self.before.replace(Before { width, mean: None }) else {
+        let first = Before {
+            width,
+            mean: None,
+            odd: 0,
+        };
+        let Some(before) = self.before.replace(first) else {
             return Likeness::Neither;
         };
         let mean = before.mean.or(period);
@@ -134,11 +145,18 @@ impl Decoder {
             .zip(period)
             .map_or(0, |(mean, period)| period.abs_diff(mean));
         let in_time = mean.is_none_or(|mean| off <= mean / LATE_PART);
-        let likeness = match (width.abs_diff(before.width) <= alike, in_time) {
+        let in_width = width.abs_diff(before.width) <= alike;
+        let likeness = match (in_width, in_time) {
             (true, true) => Likeness::Both,
             (false, false) => Likeness::Neither,
             _ => Likeness::Either,
         };
+        let odd = if in_width && !in_time {
+            before.odd + 1
+        } else {
+            0
+        };
+        let mean = if odd < NEW_RATE { mean } else { period };
         let mean = match (mean, period) {
             (Some(mean), Some(period)) if likeness == Likeness::Both => {
                 // Both are below 2³¹: a longer pause is a silence.
@@ -146,7 +164,11 @@ impl Decoder {
             }
             _ => mean,
         };
-        self.before = Some(Before { width, mean });
+        self.before = Some(Before {
+            width,
+            mean,
+            odd: odd % NEW_RATE,
+        });
         likeness
     }
 

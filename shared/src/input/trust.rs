@@ -1,7 +1,7 @@
 //! Tells a sender's frames and pulses from noise that occasionally passes the check.
 //!
-//! For a pulse the check is that it is like the one before, in width and in time. Of random pulses of valid width, one
-//! in eleven is at most; of a sender's, all but where the throttle jumps. Such jumps count against it only at zero
+//! For a pulse the check is that it is like the one before, in width and in time. Of random pulses of valid width, at
+//! most one in eleven is; of a sender's, all but where the throttle jumps. Such jumps count against it only at zero
 //! throttle: in flight it may be noise only if it is unlike in time too.
 //!
 //! One random word in sixteen passes the four check bits, and nearly all of those are throttle. Each frame is

@@ -150,10 +150,13 @@ fn a_pulse_is_held_against_the_one_before() {
         assert_eq!(likeness(low, middle), Both);
         assert_eq!(likeness(low + period, middle), Either);
         assert_eq!(likeness(low, middle), Both);
-        for _ in 0..20 {
-            assert_eq!(likeness(low + 2 * period, middle), Either);
-        }
         assert_eq!(likeness(low + 2 * period, middle - alike_ns - 1), Neither);
+        assert_eq!(likeness(low, middle - alike_ns - 1), Both);
+        for _ in 0..NEW_RATE {
+            assert_eq!(likeness(low + 2 * period, middle - alike_ns - 1), Either);
+        }
+        // The sender has another rate now.
+        assert_eq!(likeness(low + 2 * period, middle - alike_ns - 1), Both);
     }
 }
 

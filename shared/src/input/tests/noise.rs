@@ -142,3 +142,23 @@ fn one_pulse_never_opens_the_throttle() {
         }
     }
 }
+
+#[test]
+fn a_sender_may_change_its_rate_at_zero_and_in_flight() {
+    for forced in [None, Some(Signal::Pulse(Pulse::Servo))] {
+        let mut bench = Bench::new(forced);
+        let mut hold = |width_ns: u64, gap_ms: u64, ms: u64| {
+            for _ in 0..ms / (gap_ms + 2) {
+                bench.pulse_of(width_ns);
+                bench.wait_ms(gap_ms);
+            }
+            (bench.input.authority().armed(), bench.turns())
+        };
+        assert_eq!(hold(1_000_000, 18, 1_000), (true, false));
+        assert_eq!(hold(1_000_000, 2, 1_000), (true, false));
+        assert_eq!(hold(1_000_000, 18, 1_000), (true, false));
+        assert_eq!(hold(1_500_000, 18, 1_000), (true, true));
+        assert_eq!(hold(1_500_000, 2, 1_000), (true, true));
+        assert_eq!(hold(1_500_000, 18, 1_000), (true, true));
+    }
+}
