@@ -97,8 +97,8 @@ pub(crate) struct Listener {
     pub(crate) capture: Capture,
     pub(crate) setpoint: SetpointWriter,
     pub(crate) snapshot: &'static SnapshotReader,
-    /// Of the last frame, if its sender's clock is off.
-    pub(crate) frame_ticks: Option<NonZeroU32>,
+    /// Rate and duration of the last frame that asked, if its sender's clock is off.
+    pub(crate) frame_ticks: Option<(Rate, NonZeroU32)>,
 }
 
 /// Listens forever.
@@ -236,8 +236,8 @@ impl Listener {
     /// Returns so many eighths of a bit in ticks; 144 at most.
     fn eighths_ticks(&self, rate: Rate, eighths: u32) -> u32 {
         match self.frame_ticks {
-            Some(ticks) => ticks.get() * eighths / 128,
-            None => TICK_HZ / 8 * eighths / rate.bit_hz(),
+            Some((of, ticks)) if of == rate => ticks.get() * eighths / 128,
+            _ => TICK_HZ / 8 * eighths / rate.bit_hz(),
         }
     }
 
@@ -261,7 +261,7 @@ impl Listener {
             }
             let ask = take_in(throttle, edges, looks, ready)?;
             if let Some(ask) = ask {
-                self.frame_ticks = ask.frame_ticks;
+                self.frame_ticks = ask.frame_ticks.map(|ticks| (ask.rate, ticks));
             }
             let query = ask.zip(ready).map(|(ask, ready)| Query {
                 ask,
