@@ -106,7 +106,7 @@ impl Ask {
 pub struct Answers {
     /// Time from a frame's first edge to its reply, ticks, in the order of [`Rate::ALL`].
     reply_ticks: [u32; Rate::ALL.len()],
-    /// Ticks in so many seconds as a frame has bits in its reply's rate.
+    /// Ticks per second times 16 · 5/4: over a frame's ticks, its reply's bit rate.
     frames_hz: u64,
     /// Time from a frame's end to its reply.
     delay_ticks: u32,

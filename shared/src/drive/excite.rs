@@ -61,7 +61,8 @@ const SUM_SHIFT: u32 = 2;
 const SUM_MEAN_SHIFT: u32 = 5;
 
 /// Returns false if the currents' sum shows that a sensor does not read its current: the voltage would rise until the
-/// others trip, and a winding then carries twice their current.
+/// others trip, and a winding then carries twice their current. With two shunts there is no sum to compare: the third
+/// current is computed from them.
 pub(super) fn trusts(state: &mut State, trip: AdcCounts, currents: [AdcCounts; 3]) -> bool {
     let sum = currents
         .iter()

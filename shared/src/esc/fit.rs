@@ -44,7 +44,7 @@ impl Overrides {
         check(params, board)?;
         let mut running = params.clone();
         self.put(&mut running);
-        // Only what waits for a restart differs.
+        // Only what waits for a restart differs, and the direction, which fits either way.
         let param = if params.get(ParamId::PwmFreqHz) == self.pwm_freq_hz {
             ParamId::PwmDeadtimeNs
         } else {

@@ -42,7 +42,7 @@ impl Esc {
 
     /// Leaves the stored settings untouched because they are not in force, and keeps the motor off, until
     /// somebody asks for settings to be stored or reset.
-    pub fn lose_stored(&mut self) {
+    pub(super) fn lose_stored(&mut self) {
         self.storage.lose();
     }
 

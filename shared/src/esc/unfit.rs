@@ -11,7 +11,7 @@ const QUIET_US: u64 = 500_000;
 
 impl Esc {
     /// Returns the parameters as the drive runs with them, including the motor assumed by a running
-    /// identification. At power-up with those that do not fit, they are the defaults.
+    /// identification. While the parameters do not fit, they are the defaults, with which the drive powers up then.
     pub fn running(&self) -> Params {
         let mut running = if self.unfit.is_none() {
             self.params.clone()

@@ -191,7 +191,7 @@ impl Component {
         let signing = &mut self.writer.sender.signing;
         let is_time = signing.set_up(frame.bytes(10), frame.u64(0));
         let (severity, text) = if !is_time {
-            let text = "Signing refused: time is ahead";
+            let text = "Signing refused: bad time";
             (MavSeverity::MAV_SEVERITY_WARNING, text)
         } else if signing.signs() {
             let text = "Signing: changes need the key";

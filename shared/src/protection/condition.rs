@@ -167,7 +167,7 @@ conditions! {
         "see below";
     /// A current sensor's zero error is too large.
     CurrentSensor = 6 "current sensor defect" 64,
-        "a current sensor's zero is too far off"
+        "a current sensor's zero is too far off, or it does not read during an identification"
         "its shunt and amplifier: `siskin check`";
     /// Control periods took longer than the PWM's, so that duties came late.
     Overrun = 7 "control too slow" 64,

@@ -59,7 +59,7 @@ impl Commands {
         };
         if result == TEMPORARILY_REJECTED {
             let reason = if barred {
-                "settings lost, unfit"
+                "settings lost or defect"
             } else if drive.faulted {
                 "a fault holds"
             } else if !drive.stopped {

@@ -16,7 +16,7 @@ fn a_time_ahead_locks_nobody_out() {
         let far = setup(KEY, TODAY + ahead);
         bench.receive(&signed(STATION, &far, &KEY, 9, TODAY + ahead / YEAR));
         let refused = bench.answers();
-        let text = "Signing refused: time is ahead";
+        let text = "Signing refused: bad time";
         assert_eq!(texts(&refused), [text], "{ahead}");
     }
     assert!(takes(&mut bench, 6.0, STATION, 2, TODAY + SECOND));
