@@ -61,10 +61,15 @@ def spin(browser, esc, escs=(0,), components=(1,)) -> tuple[float, float]:
 
 def play(browser, text):
     """Gives the page a scenario file."""
+    give(browser, "#scenario", "some.toml", text)
+
+
+def give(browser, field, name, text):
+    """Gives a field of the page a file."""
     browser.run(f"""{{
         const files = new DataTransfer();
-        files.items.add(new File([{json.dumps(text)}], "some.toml"));
-        const input = document.querySelector("#scenario");
+        files.items.add(new File([{json.dumps(text)}], {json.dumps(name)}));
+        const input = document.querySelector({json.dumps(field)});
         input.files = files.files;
         input.dispatchEvent(new Event("change"));
     }}""")

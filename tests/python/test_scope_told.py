@@ -1,10 +1,9 @@
 """What the page tells a person: why something was refused, what state the ESC is in, what is known no more."""
 
-import json
 import re
 from xml.etree import ElementTree
 
-from scope import browser, esc, look, port, spin  # noqa: F401  (fixtures)
+from scope import browser, esc, give, look, port, spin  # noqa: F401  (fixtures)
 
 SVG = "{http://www.w3.org/2000/svg}"
 EVENTS = "document.querySelector('#events').textContent"
@@ -85,13 +84,7 @@ def test_a_refused_parameter_is_named_with_the_reason(browser, esc, port):
     assert "LIM_PHASE_A: -5 was refused" in browser.text("#param-state")
 
     lines = "CTL_RPM_MAX 5000\nLIM_PHASE_A -5\nNO_SUCH 1\nMOT_DIR\n"
-    browser.run(f"""{{
-        const files = new DataTransfer();
-        files.items.add(new File([{json.dumps(lines)}], "some.param"));
-        const input = document.querySelector("#param-load");
-        input.files = files.files;
-        input.dispatchEvent(new Event("change"));
-    }}""")
+    give(browser, "#param-load", "some.param", lines)
     browser.wait("document.querySelector('#param-state').textContent === 'Loaded: 1 set, 0 as they were, 3 refused'")
     told = browser.run("[...document.querySelectorAll('#param-problems li')].map((line) => line.textContent)")
     assert told[:2] == ["line 3: there is no parameter NO_SUCH", "line 4: MOT_DIR is not NAME VALUE"]
