@@ -108,8 +108,8 @@ impl Throttle {
         }
     }
 
-    /// Takes no stick calibration from the first signal: the chip was reset without a loss of power, and the stick may be
-    /// anywhere.
+    /// Takes no stick calibration from the first signal: the chip was reset without a loss of power, and the stick may
+    /// be anywhere.
     pub fn resume(&mut self) {
         self.input.end_calibration();
     }

@@ -28,7 +28,8 @@ const ARMING_PULSES: u32 = 5;
 /// that its checksum misses: it stops the motor until the next throttle frame. A wire is armed closed.
 const CLOSING: u8 = 10;
 /// Consecutive throttle frames of about the same throttle, or pulses like the one before from the second on, without a
-/// bad one in between, that reopen it. They delay the first by 0.75 ms at 4 kHz, 3 ms at 1 kHz, 60 ms with a servo's 50 Hz.
+/// bad one in between, that reopen it. They delay the first by 0.75 ms at 4 kHz, 3 ms at 1 kHz, 60 ms with a servo's
+/// 50 Hz.
 const OPENING: u8 = 4;
 /// The most by which two such frames differ. Noise that passes its check has any throttle.
 const AGREE: Share = Share::lit("0.0625");

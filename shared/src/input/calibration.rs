@@ -1,8 +1,8 @@
 //! Stick calibration of the pulse end points.
 //!
-//! It works as on other ESCs: power up (a mere reset does not do) with the stick at full throttle, and after two seconds the ESC reports
-//! that it has measured it; pull the stick to no throttle, and after one and a half seconds both ends are
-//! known. Anything else leaves them as they were until the next power-up.
+//! It works as on other ESCs: power up (a mere reset does not do) with the stick at full throttle, and after two seconds
+//! the ESC reports that it has measured it; pull the stick to no throttle, and after one and a half seconds both ends
+//! are known. Anything else leaves them as they were until the next power-up.
 //!
 //! A ground station may request the same at any time; the stick then has a minute to come up.
 //!

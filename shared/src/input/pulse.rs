@@ -118,9 +118,10 @@ impl Decoder {
         let Some(limits) = limits else {
             return Some(Event::Bad);
         };
+        let alike = limits.alike();
         let before = self.before.map_or(0, |before| before.width);
-        let near = width.abs_diff(before) <= 2 * limits.alike();
-        let likeness = self.likeness(width, limits.alike());
+        let near = width.abs_diff(before) <= 2 * alike;
+        let likeness = self.likeness(width, alike);
         sound.then(|| Event::Pulse {
             kind: limits.kind,
             width_ns: self.nanoseconds(width),
