@@ -34,6 +34,8 @@ pub struct Config {
     pub duty_max: I1F31,
     /// Largest length of the voltage vector, as a share of the supply.
     pub vector_max: I1F31,
+    /// Length up to which the duties make every vector, as a share of the supply: the hexagon's inscribed circle.
+    pub linear: I1F31,
     /// Length up to which every phase can be read, as a share of the supply; negative if there is none.
     pub readable: I1F31,
 }
@@ -42,7 +44,7 @@ impl Config {
     /// Creates the modulator with a largest duty. A phase can be read up to the duty `window`, all of them
     /// while the vector is short enough.
     pub fn new(modulation: Modulation, duty_max: f32, window: f32) -> Self {
-        let (longest, readable, centred) = match modulation {
+        let (longest, readable, centred): (f32, f32, i32) = match modulation {
             // The highest phase is at half the largest duty plus at most √3/2 of the vector.
             Modulation::SpaceVector => (1.0 / SQRT_3, (2.0 * window - duty_max) / SQRT_3, -1),
             Modulation::Sine(_) => (0.5, window - 0.5 * duty_max, 0),
@@ -51,8 +53,26 @@ impl Config {
             centred: I1F31::from_bits(centred),
             duty_max: I1F31::from_f32(duty_max),
             vector_max: I1F31::from_f32(longest * duty_max),
-            readable: I1F31::from_f32(readable),
+            linear: I1F31::from_f32(longest * duty_max),
+            // A vector that is too long is cut even where it could be read.
+            readable: I1F31::from_f32(readable.min(longest * duty_max)),
         }
+    }
+
+    /// Returns this modulator with overmodulation: vectors may reach beyond the hexagon, and [`beyond_hexagon`] says what
+    /// to cut off. With these the fundamental is 0.614 of the duties' range, where a six-step's would be 0.637.
+    #[must_use]
+    pub fn overmodulating(self) -> Self {
+        Self {
+            vector_max: I1F31::from_f32(0.75 * self.duty_max.to_num::<f32>()),
+            ..self
+        }
+    }
+
+    /// Returns true if vectors may be longer than the duties can make them in every direction.
+    #[inline(always)] // a comparison
+    pub fn overmodulates(&self) -> bool {
+        self.vector_max > self.linear
     }
 
     /// Returns a phase's duty.
@@ -71,6 +91,8 @@ traced! {
         pub bus: Voltage,
         /// 1/V with 28 fraction bits, saturating at 8.
         pub reciprocal: InverseVoltage,
+        /// Length up to which the duties make every vector.
+        pub linear: Voltage,
         /// Longest available voltage vector.
         pub longest: VectorLimit,
         /// Square of the length up to which every phase can be read.
@@ -125,7 +147,7 @@ impl VectorLimit {
 
     /// Returns the largest q component beside this d component.
     #[inline(always)] // in each period
-    fn q_max_beside(&self, d: Voltage) -> WideVoltage {
+    pub(super) fn q_max_beside(&self, d: Voltage) -> WideVoltage {
         // Both squares are below 12, the slope below 8.
         let less = self.slope.of(d.top(d) - self.d_square).scaled();
         (self.q - less).max(WideVoltage::ZERO)
@@ -138,6 +160,7 @@ impl Supply {
         let mut supply = Self {
             bus,
             reciprocal: InverseVoltage::ZERO,
+            linear: Voltage::ZERO,
             longest: VectorLimit::NONE,
             readable_square: WideVoltageSquare::ZERO,
         };
@@ -165,6 +188,7 @@ impl Supply {
     pub fn update_limits(&mut self, config: &Config, d: Voltage) {
         let length = config.vector_max.top(self.bus).scaled();
         self.longest = VectorLimit::new(length, d);
+        self.linear = config.linear.top(self.bus).scaled();
         self.readable_square = if config.readable.is_negative() {
             -WideVoltageSquare::DELTA
         } else {
@@ -182,7 +206,7 @@ impl Supply {
 }
 
 /// The d component leaves 2^-this of the length.
-const D_RESERVE: u32 = 3;
+const D_RESERVE: u32 = 4;
 
 /// A limited vector's square may exceed the limit by 2^-this: 0.05 % of its length.
 const TOO_LONG: u32 = 10;
@@ -212,6 +236,51 @@ pub fn limit(u: Dq<WideVoltage>, longest: &VectorLimit) -> (Dq<Voltage>, Option<
     };
     (short(Dq { d, q }), Some(cut))
 }
+
+/// cos 30°.
+const COS_30: I1F31 = I1F31::lit("0.866025403784");
+
+/// Returns what to cut off a vector to bring it into the hexagon of what the duties can make: at a right angle to its
+/// side, which is the least that can be, and what duties clamped at both ends would do.
+///
+/// `linear` is the radius of the hexagon's inscribed circle; the vector is no longer than 1.3 times it.
+#[inline(never)] // few periods
+pub fn beyond_hexagon(
+    v: AlphaBeta<TurnedVoltage>,
+    linear: Voltage,
+) -> Option<AlphaBeta<TurnedVoltage>> {
+    let linear = linear.scaled();
+    // Beside a corner the nearest point of the one side is beyond the next side.
+    let inside = within_side(within_side(v, linear), linear);
+    (inside != v).then(|| AlphaBeta {
+        alpha: v.alpha.wrapping_sub(inside.alpha),
+        beta: v.beta.wrapping_sub(inside.beta),
+    })
+}
+
+/// Returns the nearest point within the side in whose direction a vector is longest.
+#[inline(never)] // it is called twice
+fn within_side(v: AlphaBeta<TurnedVoltage>, linear: TurnedVoltage) -> AlphaBeta<TurnedVoltage> {
+    // Along the sides' normals at 30°, 90° and 150°.
+    let (x, y): (TurnedVoltage, _) = (v.alpha.top(COS_30).scaled(), v.beta >> 1);
+    let mut most = (v.beta, (I1F31::ZERO, I1F31::MAX));
+    for other in [
+        (y.wrapping_add(x), (COS_30, HALF)),
+        (y.wrapping_sub(x), (-COS_30, HALF)),
+    ] {
+        if other.0.abs() > most.0.abs() {
+            most = other;
+        }
+    }
+    let (length, normal) = most;
+    let over = length.wrapping_sub(length.min(linear).max(-linear));
+    AlphaBeta {
+        alpha: v.alpha.wrapping_sub(over.top(normal.0).scaled()),
+        beta: v.beta.wrapping_sub(over.top(normal.1).scaled()),
+    }
+}
+
+const HALF: I1F31 = I1F31::lit("0.5");
 
 /// Returns the square of a vector's length. No component exceeds 128, so the sum is below 2^15.
 #[inline(always)] // in each period
@@ -394,6 +463,46 @@ mod tests {
         let (passed, cut) = limit(again, &longest(0.501));
         assert_eq!(cut, None);
         assert_eq!((wide(passed.d), wide(passed.q)), (again.d, again.q));
+    }
+
+    /// What is cut off beyond the hexagon leaves what the duties make of it, and the more is asked the longer is the
+    /// fundamental, to 0.614 of the duties' range.
+    #[test]
+    fn overmodulation_gives_the_fundamental_that_is_asked_and_then_0_614_of_the_range() {
+        let config = config(Modulation::SpaceVector, 0.95).overmodulating();
+        let supply = Supply::new(&config, Voltage::ONE, Voltage::ZERO);
+        assert!((supply.linear.to_num::<f64>() - 0.95 / 3.0_f64.sqrt()).abs() < 1e-6);
+        let mut before = 0.0;
+        for step in 0..=20 {
+            let length = 0.375 + 0.0168 * f64::from(step);
+            let mut fundamental = 0.0;
+            for degrees in 0..360 {
+                let (sin, cos) = (f64::from(degrees) / 360.0 * TAU).sin_cos();
+                let v = AlphaBeta {
+                    alpha: TurnedVoltage::from_num(length * cos),
+                    beta: TurnedVoltage::from_num(length * sin),
+                };
+                let over = beyond_hexagon(v, supply.linear).unwrap_or_default();
+                let v = AlphaBeta {
+                    alpha: v.alpha - over.alpha,
+                    beta: v.beta - over.beta,
+                };
+                let made = vector(uncompensated(&config, &supply, v), 1.0);
+                let wanted = (v.alpha.to_num::<f64>(), v.beta.to_num::<f64>());
+                let error = (made.0 - wanted.0).hypot(made.1 - wanted.1);
+                assert!(error < 2e-5, "{length} at {degrees}: {error}");
+                fundamental += (made.0 * cos + made.1 * sin) / 360.0;
+            }
+            assert!(fundamental > before, "{length}: {fundamental}");
+            if length < 0.548 {
+                assert!(
+                    (fundamental - length).abs() < 2e-5,
+                    "{length}: {fundamental}"
+                );
+            }
+            before = fundamental;
+        }
+        assert!((before / 0.95 - 0.614).abs() < 1e-3, "{before}");
     }
 
     #[test]
