@@ -20,6 +20,7 @@ pub mod start;
 pub mod torque;
 pub mod transform;
 pub mod voltage;
+pub mod weakening;
 
 /// Control periods per period of the outer loops: speed, torque and voltage.
 pub const PERIODS: u32 = 8;

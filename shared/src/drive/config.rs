@@ -8,7 +8,7 @@ use core::mem::MaybeUninit;
 use crate::control::delay::Delay;
 use crate::control::{
     catch, dead_time, inductance, low_speed, modulator, observer, regulator, sensing, speed, start,
-    torque,
+    torque, weakening,
 };
 use crate::math::{Gain, Multiplier};
 use crate::parts;
@@ -81,6 +81,8 @@ pub struct Config {
     pub adapt_l: Option<inductance::Config>,
     /// Currents and bounds for the observer at low speed.
     pub low_speed: low_speed::Config,
+    /// Flux weakening.
+    pub weakening: weakening::Config,
     /// The quick attempt, and those of a start in order.
     pub start: [start::Config; 1 + ATTEMPTS],
     /// Supply whose longest vector an open-loop start may use: enough to take a sound motor's current to its limit at

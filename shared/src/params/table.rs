@@ -377,6 +377,8 @@ parameters! {
     37 CtlFfA "CTL_FF_A" "A" Real 0.0..200.0 = 8.4 live
         "Steady current at CTL_RPM_MAX, fed forward with the square of the speed if CTL_SPEED is 1"
         in Propeller;
+    38 CtlWeaken "CTL_WEAKEN" "%" Real 0.0..100.0 = 80.0
+        "Share of the flux that i_d may take away where the supply is used up; 0 is none";
     40 PwmFreqHz "PWM_FREQ_HZ" "Hz" Real 8000.0..60000.0 = 24000.0 restart
         "PWM frequency; the control runs once a period";
     41 PwmDeadtimeNs "PWM_DEADTIME_NS" "ns" Real 0.0..3000.0 = 500.0 restart

@@ -98,6 +98,15 @@ impl Config {
         }
     }
 
+    /// Returns the voltage along q that a current along d induces, ω̂·L·i_d; zero from a regulator that does not know
+    /// it.
+    pub fn induced(&self, state: &State, i_d: Current) -> Voltage {
+        match self {
+            Self::Synchronous(_) => state.synchronous.cross.of(i_d).scaled(),
+            Self::ObserverBased(..) | Self::Modified(..) => Voltage::ZERO,
+        }
+    }
+
     /// Presets the integrators so that [`Config::voltage`] is `u`: a bumpless takeover from whatever applied
     /// that voltage.
     ///

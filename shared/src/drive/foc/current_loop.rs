@@ -87,7 +87,7 @@ pub(super) fn current_loop(
     let u = if modulator::square_of(demand) <= shared.supply.readable_square {
         modulator::short(demand)
     } else {
-        limited(config, loops, shared, demand)
+        limited(config, loops, shared, demand, frame.angle)
     };
     observer.advance(&mut foc.observer, &fb, u);
     shared.seen.u = u;
@@ -116,12 +116,36 @@ fn limited(
     loops: &mut Loops,
     shared: &mut Shared,
     demand: Dq<WideVoltage>,
+    angle: SinCos,
 ) -> Dq<Voltage> {
     shared.applied.expect_unreadable();
-    let (u, cut) = modulator::limit(demand, &shared.supply.longest);
+    let (mut u, cut) = modulator::limit(demand, &shared.supply.longest);
+    loops.weakening.note(u, cut, &shared.supply.longest);
     if let Some(cut) = cut {
         config.regulator.anti_windup(&mut loops.regulator, cut);
-        loops.i_q_shortfall = loops.reference.i.q.minus(shared.seen.i.q);
+        let longest = &shared.supply.longest;
+        if !config
+            .weakening
+            .helps(&loops.weakening, shared.seen.speed, longest)
+        {
+            loops.i_q_shortfall = loops.reference.i.q.minus(shared.seen.i.q);
+        }
+    }
+    if config.modulator.overmodulates() {
+        let v = inverse_park(rotate(u, loops.delay_rotation), angle);
+        if let Some(over) = modulator::beyond_hexagon(v, shared.supply.linear) {
+            // Back from where the frame will be.
+            let Dq { d, q } = park(over, angle);
+            let over = park(AlphaBeta { alpha: d, beta: q }, loops.delay_rotation);
+            let over: Dq<Voltage> = Dq {
+                d: over.d.scaled(),
+                q: over.q.scaled(),
+            };
+            u = Dq {
+                d: u.d.minus(over.d),
+                q: u.q.minus(over.q),
+            };
+        }
     }
     u
 }

@@ -109,9 +109,21 @@ pub(in crate::drive) fn supply_bounds(config: &Config, foc: &mut State, shared: 
 pub(in crate::drive) fn speed_bounds(config: &Config, foc: &mut State, shared: &Shared) {
     let bounds = shared.protection.bounds;
     let loops = &mut foc.loops;
-    let (i_d, bounds) = config.low_speed.bounds(bounds, shared.seen.speed);
-    loops.i_d_reference = protection::burning_i_d(&config.protection, &shared.protection, i_d);
-    loops.i_q_bounds = bounds;
+    let (speed, weakening) = (shared.seen.speed, &mut loops.weakening);
+    let (i_d, bounds) = config.low_speed.bounds(bounds, speed);
+    let longest = &shared.supply.longest;
+    config
+        .weakening
+        .step(weakening, speed, shared.seen.u, longest);
+    loops.i_d_reference = if weakening.i_d == Current::ZERO {
+        protection::burning_i_d(&config.protection, &shared.protection, i_d)
+    } else {
+        // It burns power too.
+        weakening.i_d
+    };
+    loops.i_q_bounds = config
+        .weakening
+        .bounds(weakening, bounds, config.protection.phase);
 }
 
 /// Updates the current reference in Run and Stopping.
@@ -170,7 +182,14 @@ fn at_voltage(
     shared: &Shared,
     share: fixed::types::I1F31,
 ) -> Reference {
-    let u_q = voltage::of_share(share, shared.supply.longest.length()).max(config.least_u_q);
+    let mut u_q = voltage::of_share(share, shared.supply.linear).max(config.least_u_q);
+    if config.weakening.most != Current::ZERO {
+        // As if the supply had it all: what i_d takes away is not the throttle's.
+        let i_d = foc.loops.weakening.i_d;
+        u_q = u_q
+            .plus(voltage::beyond(share, shared.supply.linear))
+            .plus(config.regulator.induced(&foc.loops.regulator, i_d));
+    }
     let frame = (shared.seen.speed, shared.seen.i);
     let factor = foc.loops.inductance.factor;
     let fb = config.observer.feedback(&foc.observer, frame, factor);

@@ -4,7 +4,7 @@ use crate::control::inductance;
 use crate::control::regulator::{self, Reference};
 use crate::control::speed::Bounds;
 use crate::control::transform::{AlphaBeta, Dq, PhaseOrder};
-use crate::control::{dead_time, observer, speed, start, torque};
+use crate::control::{dead_time, observer, speed, start, torque, weakening};
 use crate::drive::config::Config;
 use crate::drive::schedule::Slot;
 use crate::math::SinCos;
@@ -38,6 +38,7 @@ traced! {
         pub(in crate::drive) inductance: inductance::State,
         pub(in crate::drive) speed: speed::State,
         pub(in crate::drive) torque: torque::State,
+        pub(in crate::drive) weakening: weakening::State,
         /// Change of ω* in the last period.
         pub(in crate::drive) reference_step: Speed,
         /// i_d* at the present speed.
@@ -64,6 +65,7 @@ impl Loops {
             inductance: inductance::State::default(),
             speed: speed::State::default(),
             torque: torque::State::default(),
+            weakening: weakening::State::default(),
             reference_step: Speed::ZERO,
             i_d_reference: Current::ZERO,
             i_q_bounds: Bounds::default(),
@@ -96,6 +98,7 @@ impl State {
         loops.reference_step = Speed::ZERO;
         loops.i_q_shortfall = Current::ZERO;
         loops.torque = torque::State::default();
+        loops.weakening = weakening::State::default();
         loops.reference = Reference::default();
         loops.inductance.begin();
         loops.start = start::State::default();

@@ -170,6 +170,7 @@ pub fn build_in(
     outer::torque(&p, &mut place.torque);
     inductance::inductance(&p, &mut place.adapt_l);
     place.low_speed = low_speed(&p);
+    outer::weakening(&p, &mut place.weakening);
     start::attempts(&p, &mut place.start);
     if !p.chosen(CtlDrive::FieldOriented) {
         // Six-step never uses the coefficients above, so they need not fit: its motor may be any.
@@ -191,6 +192,11 @@ pub fn build_in(
             Shunts::Two => 0.0,
         },
     );
+    // Everywhere in the hexagon the low sides are on for as long as reading takes.
+    let whole = modulation == Modulation::SpaceVector && duty_max <= window;
+    if whole && place.weakening.most != Current::ZERO {
+        place.modulator = core::mem::take(&mut place.modulator).overmodulating();
+    }
     place.start_bus = start::bus(&p);
     sensing::sensing(&p, window, &mut place.sensing);
     sensing::catch(&p, &mut place.catch);

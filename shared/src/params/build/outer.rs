@@ -4,8 +4,8 @@ use core::f32::consts::TAU;
 
 use super::si::Si;
 use crate::control::speed::{Config, Law, feed_forward, nested};
-use crate::control::{planner, torque};
-use crate::math::{Gain, Real};
+use crate::control::{planner, torque, weakening};
+use crate::math::{Gain, Real, SQRT_3};
 use crate::params::ParamId;
 use crate::params::choice::{CtlObserver, CtlRegulator, CtlSpeed};
 use crate::parts;
@@ -52,6 +52,27 @@ pub(super) fn torque(p: &Si, place: &mut torque::Config) {
         // Sensors do not take the growth for a turn of the rotor, and the first paper has no such limit.
         place.growth = place.slew;
     }
+}
+
+/// Greatest current along −d over `LIM_PHASE_A`.
+const WEAKENING_SHARE: f32 = 0.8;
+
+/// Time in which i_d makes up for missing voltage, s, at the speed where it ends; longer below.
+const WEAKENING_S: f32 = 0.008;
+
+/// Sets up flux weakening. The first paper's observer and both papers' other regulators stay as published.
+pub(super) fn weakening(p: &Si, place: &mut weakening::Config) {
+    if !p.is_helped() || !p.chosen(CtlRegulator::Synchronous) {
+        return;
+    }
+    let most_a = (0.01 * p.get(ParamId::CtlWeaken) * p.flux / p.l).min(WEAKENING_SHARE * p.limit_a);
+    let end_rad_s = p.supply_max_v / (SQRT_3 * p.flux);
+    let a_per_v = p.t / WEAKENING_S / (end_rad_s * p.l);
+    place.most = p.scale.current_from_a(most_a);
+    // The type ends at 1/32; where that binds, i_d follows more slowly.
+    let rate = (a_per_v * p.unit_v / p.unit_a).min(0.03);
+    place.rate = p.factor(ParamId::MotLUh, rate);
+    place.end = Speed::from_f32(end_rad_s / p.rad_per_unit);
 }
 
 /// Returns the factor of both times.
