@@ -11,6 +11,7 @@ pub mod inductance;
 pub mod low_speed;
 pub mod modulator;
 pub mod observer;
+pub mod overmodulation;
 pub mod planner;
 pub mod regulator;
 pub mod sensing;

@@ -6,14 +6,15 @@ use fixed::types::extra::U20;
 use fixed::types::{I0F32, I1F31, I8F24};
 
 use super::dead_time;
+use super::overmodulation::Overmodulation;
 use super::transform::{AlphaBeta, Dq, PhaseOrder, phases_in};
 use crate::math::{Held, Multiplier, Quantity, Real, SQRT_3, TopProduct, TopSum, other_leg};
 use crate::parts;
 use crate::trace::traced;
 use crate::units::dimension::Volt;
 use crate::units::{
-    Duty, InverseVoltage, TurnedVoltage, Voltage, VoltageSquare, WideVoltage, WideVoltageSquare,
-    wide,
+    Duty, InverseVoltage, Speed, TurnedVoltage, Voltage, VoltageSquare, WideVoltage,
+    WideVoltageSquare, wide,
 };
 
 /// The choice of common-mode voltage.
@@ -30,19 +31,22 @@ pub enum Modulation {
 pub struct Config {
     /// All ones where the common mode follows the phases, else zero.
     centred: I1F31,
-    /// Largest duty; the remainder is the low-side on-time that reading the shunts takes.
+    /// Largest duty of a phase that switches; the remainder is the low-side on-time that reading the shunts and supplying
+    /// the high side's driver take.
     pub duty_max: I1F31,
-    /// Largest length of the voltage vector, as a share of the supply.
+    /// Largest length of the voltage vector while every phase switches, as a share of the supply.
     pub vector_max: I1F31,
-    /// Length up to which the duties make every vector, as a share of the supply: the hexagon's inscribed circle.
-    pub linear: I1F31,
     /// Length up to which every phase can be read, as a share of the supply; negative if there is none.
     pub readable: I1F31,
+    /// Length up to which the duties make every vector, as a share of the supply.
+    pub linear: I1F31,
+    /// How far beyond.
+    pub over: Overmodulation,
 }
 
 impl Config {
-    /// Creates the modulator with a largest duty. A phase can be read up to the duty `window`, all of them
-    /// while the vector is short enough.
+    /// Creates the modulator with a largest duty. A phase can be read up to the duty `window`, at most the largest, all of
+    /// them while the vector is short enough.
     pub fn new(modulation: Modulation, duty_max: f32, window: f32) -> Self {
         let (longest, readable, centred): (f32, f32, i32) = match modulation {
             // The highest phase is at half the largest duty plus at most √3/2 of the vector.
@@ -53,33 +57,20 @@ impl Config {
             centred: I1F31::from_bits(centred),
             duty_max: I1F31::from_f32(duty_max),
             vector_max: I1F31::from_f32(longest * duty_max),
+            readable: I1F31::from_f32(readable),
             linear: I1F31::from_f32(longest * duty_max),
-            // A vector that is too long is cut even where it could be read.
-            readable: I1F31::from_f32(readable.min(longest * duty_max)),
+            over: Overmodulation::default(),
         }
     }
 
-    /// Returns this modulator with overmodulation: vectors may reach beyond the hexagon, and [`beyond_hexagon`] says what
-    /// to cut off. With these the fundamental is 0.614 of the duties' range, where a six-step's would be 0.637.
-    #[must_use]
-    pub fn overmodulating(self) -> Self {
-        Self {
-            vector_max: I1F31::from_f32(0.75 * self.duty_max.to_num::<f32>()),
-            ..self
-        }
-    }
-
-    /// Returns true if vectors may be longer than the duties can make them in every direction.
-    #[inline(always)] // a comparison
-    pub fn overmodulates(&self) -> bool {
-        self.vector_max > self.linear
-    }
-
-    /// Returns a phase's duty.
+    /// Returns the half of the range plus half of the middle phase: the duty of a phase without voltage.
     #[inline(always)] // in each period
-    fn duty(&self, common: I1F31, share: Share) -> Duty {
-        let duty = common.wrapping_add(whole(share)).max(I1F31::ZERO);
-        Duty::from_bits(duty.min(self.duty_max).to_bits() as u32)
+    pub(super) fn common(&self, [a, b, c]: [Share; 3]) -> I1F31 {
+        // Without the common mode the phases sum to zero, so highest plus lowest is minus the middle phase.
+        let (low, high) = if a < b { (a, b) } else { (b, a) };
+        let middle = c.max(low).min(high);
+        let half: I1F31 = whole(middle) >> 1;
+        (self.duty_max >> 1) + (half & self.centred)
     }
 }
 
@@ -186,8 +177,23 @@ impl Supply {
     /// Updates the lengths a vector may have, for commands with a d component near `d`.
     #[inline(never)] // only some periods
     pub fn update_limits(&mut self, config: &Config, d: Voltage) {
-        let length = config.vector_max.top(self.bus).scaled();
-        self.longest = VectorLimit::new(length, d);
+        self.limit_to(config, config.vector_max, d);
+    }
+
+    /// The same, where the rotor's speed lets vectors be longer.
+    #[inline(never)] // only some periods
+    pub fn update_limits_at(&mut self, config: &Config, d: Voltage, speed: Speed) {
+        let over = &config.over;
+        let longest = if speed < over.from {
+            config.vector_max
+        } else {
+            over.vector_max
+        };
+        self.limit_to(config, longest, d);
+    }
+
+    fn limit_to(&mut self, config: &Config, longest: I1F31, d: Voltage) {
+        self.longest = VectorLimit::new(longest.top(self.bus).scaled(), d);
         self.linear = config.linear.top(self.bus).scaled();
         self.readable_square = if config.readable.is_negative() {
             -WideVoltageSquare::DELTA
@@ -237,51 +243,6 @@ pub fn limit(u: Dq<WideVoltage>, longest: &VectorLimit) -> (Dq<Voltage>, Option<
     (short(Dq { d, q }), Some(cut))
 }
 
-/// cos 30°.
-const COS_30: I1F31 = I1F31::lit("0.866025403784");
-
-/// Returns what to cut off a vector to bring it into the hexagon of what the duties can make: at a right angle to its
-/// side, which is the least that can be, and what duties clamped at both ends would do.
-///
-/// `linear` is the radius of the hexagon's inscribed circle; the vector is no longer than 1.3 times it.
-#[inline(never)] // few periods
-pub fn beyond_hexagon(
-    v: AlphaBeta<TurnedVoltage>,
-    linear: Voltage,
-) -> Option<AlphaBeta<TurnedVoltage>> {
-    let linear = linear.scaled();
-    // Beside a corner the nearest point of the one side is beyond the next side.
-    let inside = within_side(within_side(v, linear), linear);
-    (inside != v).then(|| AlphaBeta {
-        alpha: v.alpha.wrapping_sub(inside.alpha),
-        beta: v.beta.wrapping_sub(inside.beta),
-    })
-}
-
-/// Returns the nearest point within the side in whose direction a vector is longest.
-#[inline(never)] // it is called twice
-fn within_side(v: AlphaBeta<TurnedVoltage>, linear: TurnedVoltage) -> AlphaBeta<TurnedVoltage> {
-    // Along the sides' normals at 30°, 90° and 150°.
-    let (x, y): (TurnedVoltage, _) = (v.alpha.top(COS_30).scaled(), v.beta >> 1);
-    let mut most = (v.beta, (I1F31::ZERO, I1F31::MAX));
-    for other in [
-        (y.wrapping_add(x), (COS_30, HALF)),
-        (y.wrapping_sub(x), (-COS_30, HALF)),
-    ] {
-        if other.0.abs() > most.0.abs() {
-            most = other;
-        }
-    }
-    let (length, normal) = most;
-    let over = length.wrapping_sub(length.min(linear).max(-linear));
-    AlphaBeta {
-        alpha: v.alpha.wrapping_sub(over.top(normal.0).scaled()),
-        beta: v.beta.wrapping_sub(over.top(normal.1).scaled()),
-    }
-}
-
-const HALF: I1F31 = I1F31::lit("0.5");
-
 /// Returns the square of a vector's length. No component exceeds 128, so the sum is below 2^15.
 #[inline(always)] // in each period
 pub fn square_of(u: Dq<WideVoltage>) -> WideVoltageSquare {
@@ -302,7 +263,43 @@ pub fn short(u: Dq<WideVoltage>) -> Dq<Voltage> {
     }
 }
 
-/// Returns the three duties of a voltage vector that [`limit`] has passed.
+/// A voltage vector as phases, each as a share of the supply.
+pub(super) struct Phases {
+    /// What each phase has above their mean.
+    pub(super) shares: [Share; 3],
+    /// The same, and what the dead time takes away: `dead_time` times the certainty of the phase current's sign.
+    pub(super) compensated: [Share; 3],
+}
+
+impl Phases {
+    /// Returns the phases of a vector.
+    #[inline(always)] // in each period
+    pub(super) fn new(
+        supply: &Supply,
+        v: AlphaBeta<TurnedVoltage>,
+        order: PhaseOrder,
+        dead_time: &dead_time::Config,
+        certainty: AlphaBeta<I8F24>,
+    ) -> Self {
+        let share: AlphaBeta<Share> = AlphaBeta {
+            alpha: v.alpha.top(supply.reciprocal),
+            beta: v.beta.top(supply.reciprocal),
+        };
+        let shares @ [a, b, c] = phases_in(order, share);
+        let [ca, cb, cc] = phases_in(order, certainty);
+        Self {
+            shares,
+            // Not by `map` or a closure, which become a loop or calls in a build optimised for size.
+            compensated: [
+                dead_time.compensated(a, ca),
+                dead_time.compensated(b, cb),
+                dead_time.compensated(c, cc),
+            ],
+        }
+    }
+}
+
+/// Returns the three duties of a voltage vector within which every phase can be read.
 ///
 /// Adds to each duty what the dead time takes away: `dead_time` times the certainty of the phase current's
 /// sign.
@@ -315,41 +312,35 @@ pub fn duties(
     dead_time: &dead_time::Config,
     certainty: AlphaBeta<I8F24>,
 ) -> [Duty; 3] {
-    let share: AlphaBeta<Share> = AlphaBeta {
-        alpha: v.alpha.top(supply.reciprocal),
-        beta: v.beta.top(supply.reciprocal),
-    };
-    let [a, b, c] = phases_in(order, share);
-    // Without the common mode the phases sum to zero, so highest plus lowest is minus the middle phase.
-    let (low, high) = if a < b { (a, b) } else { (b, a) };
-    let middle = c.max(low).min(high);
-    let half: I1F31 = whole(middle) >> 1;
-    let common: I1F31 = (config.duty_max >> 1) + (half & config.centred);
-    let [ca, cb, cc] = phases_in(order, certainty);
-    // Not by `map` or a closure, which become a loop or calls in a build optimised for size.
-    [
-        config.duty(common, dead_time.compensated(a, ca)),
-        config.duty(common, dead_time.compensated(b, cb)),
-        config.duty(common, dead_time.compensated(c, cc)),
-    ]
+    let phases = Phases::new(supply, v, order, dead_time, certainty);
+    let common = config.common(phases.shares);
+    let [a, b, c] = phases.compensated;
+    [duty(common, a), duty(common, b), duty(common, c)]
 }
 
 /// Returns the three duties of a vector, without compensation of the dead time: at standstill.
 #[inline(always)] // as a call it costs 48 bytes more on the chip
 pub fn uncompensated(config: &Config, supply: &Supply, v: AlphaBeta<TurnedVoltage>) -> [Duty; 3] {
-    duties(
-        config,
-        supply,
-        v,
-        PhaseOrder::NORMAL,
-        &dead_time::Config::NONE,
-        AlphaBeta::default(),
-    )
+    let (order, none) = (PhaseOrder::NORMAL, &dead_time::Config::NONE);
+    let most = whole_duty(config.duty_max);
+    duties(config, supply, v, order, none, AlphaBeta::default()).map(|duty| duty.min(most))
 }
 
-/// Converts the share to a duty: a vector is at most 1/√3 long.
+/// Returns a phase's duty, which is below 1.
 #[inline(always)] // in each period
-fn whole(share: Share) -> I1F31 {
+fn duty(common: I1F31, share: Share) -> Duty {
+    whole_duty(common.wrapping_add(whole(share)).max(I1F31::ZERO))
+}
+
+/// Returns a share that is not negative as a duty.
+#[inline(always)] // in each period
+pub(super) fn whole_duty(share: I1F31) -> Duty {
+    Duty::from_bits(share.to_bits() as u32)
+}
+
+/// Converts the share to a duty: no phase of a vector has more than 3/4 of the supply.
+#[inline(always)] // in each period
+pub(super) fn whole(share: Share) -> I1F31 {
     I1F31::from_bits(share.to_bits() << 9)
 }
 
@@ -463,46 +454,6 @@ mod tests {
         let (passed, cut) = limit(again, &longest(0.501));
         assert_eq!(cut, None);
         assert_eq!((wide(passed.d), wide(passed.q)), (again.d, again.q));
-    }
-
-    /// What is cut off beyond the hexagon leaves what the duties make of it, and the more is asked the longer is the
-    /// fundamental, to 0.614 of the duties' range.
-    #[test]
-    fn overmodulation_gives_the_fundamental_that_is_asked_and_then_0_614_of_the_range() {
-        let config = config(Modulation::SpaceVector, 0.95).overmodulating();
-        let supply = Supply::new(&config, Voltage::ONE, Voltage::ZERO);
-        assert!((supply.linear.to_num::<f64>() - 0.95 / 3.0_f64.sqrt()).abs() < 1e-6);
-        let mut before = 0.0;
-        for step in 0..=20 {
-            let length = 0.375 + 0.0168 * f64::from(step);
-            let mut fundamental = 0.0;
-            for degrees in 0..360 {
-                let (sin, cos) = (f64::from(degrees) / 360.0 * TAU).sin_cos();
-                let v = AlphaBeta {
-                    alpha: TurnedVoltage::from_num(length * cos),
-                    beta: TurnedVoltage::from_num(length * sin),
-                };
-                let over = beyond_hexagon(v, supply.linear).unwrap_or_default();
-                let v = AlphaBeta {
-                    alpha: v.alpha - over.alpha,
-                    beta: v.beta - over.beta,
-                };
-                let made = vector(uncompensated(&config, &supply, v), 1.0);
-                let wanted = (v.alpha.to_num::<f64>(), v.beta.to_num::<f64>());
-                let error = (made.0 - wanted.0).hypot(made.1 - wanted.1);
-                assert!(error < 2e-5, "{length} at {degrees}: {error}");
-                fundamental += (made.0 * cos + made.1 * sin) / 360.0;
-            }
-            assert!(fundamental > before, "{length}: {fundamental}");
-            if length < 0.548 {
-                assert!(
-                    (fundamental - length).abs() < 2e-5,
-                    "{length}: {fundamental}"
-                );
-            }
-            before = fundamental;
-        }
-        assert!((before / 0.95 - 0.614).abs() < 1e-3, "{before}");
     }
 
     #[test]

@@ -15,8 +15,8 @@ use crate::units::{Current, Speed, Voltage, WideVoltage, stated_emf, wide};
 pub const PERIODS: u32 = 16;
 
 /// The voltage along q that is kept in reserve, so that the current stays regulated: 2^-this of the longest vector. With
-/// overmodulation it makes 1 % of the fundamental.
-const MARGIN: u32 = 4;
+/// overmodulation it makes 2 % of the fundamental.
+const MARGIN: u32 = 5;
 
 /// Coefficients.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -118,6 +118,8 @@ mod tests {
 
     const MOST: Current = Current::lit("0.8");
 
+    const RESERVE: f64 = 1.0 / (1 << MARGIN) as f64;
+
     fn config() -> Config {
         Config {
             most: MOST,
@@ -160,9 +162,9 @@ mod tests {
     fn missing_voltage_is_integrated_up_to_the_most_and_returns_with_voltage_to_spare() {
         let (config, mut state) = (config(), State::default());
         run(&config, &mut state, 0.1, 0.6, 1);
-        // 0.1 V beyond the limit and 1/16 of it in reserve, at 0.01 a volt.
+        // 0.1 V beyond the limit and the reserve, at 0.01 a volt.
         let i_d = state.i_d.to_num::<f64>();
-        assert!((i_d + 0.01 * (0.1 + 0.5 / 16.0)).abs() < 1e-5, "{i_d}");
+        assert!((i_d + 0.01 * (0.1 + 0.5 * RESERVE)).abs() < 1e-5, "{i_d}");
         run(&config, &mut state, 0.1, 0.6, 1000);
         assert_eq!(state.i_d, -MOST);
         run(&config, &mut state, 0.1, 0.2, 1000);
@@ -174,7 +176,7 @@ mod tests {
         let (config, mut state) = (config(), State::default());
         run(&config, &mut state, 0.1, 0.6, 100);
         let before = state.i_d;
-        run(&config, &mut state, 0.1, 0.5 * 15.0 / 16.0, 100);
+        run(&config, &mut state, 0.1, 0.5 * (1.0 - RESERVE), 100);
         let moved = (state.i_d - before).to_num::<f64>();
         // 100 roundings of the voltage's 2^-24.
         assert!(moved.abs() < 1e-5, "{moved}");

@@ -262,6 +262,12 @@ impl Applied {
         self.duties = [[Duty::ZERO; 3]; 2];
     }
 
+    /// Returns true if the next command may leave a phase unreadable.
+    #[inline(always)] // in each period
+    pub(super) fn may_be_unreadable(&self) -> bool {
+        self.unreadable == UNREADABLE
+    }
+
     /// Notes that the next command may leave a phase unreadable.
     pub(super) fn expect_unreadable(&mut self) {
         if self.unreadable == 0 {

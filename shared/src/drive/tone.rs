@@ -189,7 +189,7 @@ fn regulate(tone: &tone::Config, playing: &mut State, supply: &Supply) {
         half.top(missing).to_bits()
     });
     let wanted = playing.amplitude.plus(step).max(Voltage::ZERO);
-    let most = needed.plus(needed).plus(dead).min(supply.linear);
+    let most = needed.plus(needed).plus(dead).min(supply.longest.length());
     playing.needed = if wanted > most {
         needed.plus(needed)
     } else {

@@ -2,15 +2,16 @@
 
 use super::state::{Loops, State};
 use crate::control::delay::Delay;
+use crate::control::modulator::Supply;
 use crate::control::observer::Input;
 use crate::control::transform::{AlphaBeta, Dq, PhaseOrder, inverse_park, park, rotate, voltages};
-use crate::control::{modulator, start};
+use crate::control::{modulator, overmodulation, start};
 use crate::drive::config::Config;
 use crate::drive::io::{Bridge, Sample, hall};
 use crate::drive::phase::Phase;
 use crate::drive::shared::Shared;
 use crate::math::{Held, SinCos, sin_cos};
-use crate::units::{Current, Speed, Voltage, WideVoltage};
+use crate::units::{Current, Duty, Speed, Voltage, WideVoltage};
 
 /// The control's frame in a period.
 #[derive(Clone, Copy)]
@@ -95,17 +96,41 @@ pub(super) fn current_loop(
     // The duties, for where the frame will be when they act.
     let v = inverse_park(rotate(u, loops.delay_rotation), frame.angle);
     loops.commanded_voltages = [voltages(v), loops.commanded_voltages[0]];
-    let certainty = inverse_park(loops.dead_time_sign, frame.angle);
-    let duties = modulator::duties(
-        &config.modulator,
-        &shared.supply,
-        v,
-        loops.phase_order,
-        &config.dead_time,
-        certainty,
-    );
+    let duties = if shared.applied.may_be_unreadable() {
+        // One by one: an array that may come in memory would be in memory in every period.
+        let [a, b, c] = long_duties(config, loops, &shared.supply, frame.angle);
+        [a, b, c]
+    } else {
+        let certainty = inverse_park(loops.dead_time_sign, frame.angle);
+        modulator::duties(
+            &config.modulator,
+            &shared.supply,
+            v,
+            loops.phase_order,
+            &config.dead_time,
+            certainty,
+        )
+    };
     shared.applied.command(duties);
     Bridge::Duty(duties)
+}
+
+/// Returns the duties of the commanded vector, if it may be too long to read every phase.
+#[cold]
+#[inline(never)] // few periods
+fn long_duties(config: &Config, loops: &Loops, supply: &Supply, angle: SinCos) -> [Duty; 3] {
+    let [v, _] = loops.commanded_voltages;
+    overmodulation::duties(
+        &config.modulator,
+        supply,
+        AlphaBeta {
+            alpha: v.alpha.scaled(),
+            beta: v.beta.scaled(),
+        },
+        loops.phase_order,
+        &config.dead_time,
+        inverse_park(loops.dead_time_sign, angle),
+    )
 }
 
 /// Handles a voltage vector too long to read every phase, or for the supply. Anti-windup: the regulator's
@@ -131,9 +156,9 @@ fn limited(
             loops.i_q_shortfall = loops.reference.i.q.minus(shared.seen.i.q);
         }
     }
-    if config.modulator.overmodulates() {
+    if shared.supply.longest.length() > shared.supply.linear {
         let v = inverse_park(rotate(u, loops.delay_rotation), angle);
-        if let Some(over) = modulator::beyond_hexagon(v, shared.supply.linear) {
+        if let Some(over) = overmodulation::beyond_hexagon(v, shared.supply.linear) {
             // Back from where the frame will be.
             let Dq { d, q } = park(over, angle);
             let over = park(AlphaBeta { alpha: d, beta: q }, loops.delay_rotation);

@@ -83,9 +83,8 @@ pub(in crate::drive) fn supply(shared: &mut Shared) {
 /// Updates the longest vector that the supply allows.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn longest_vector(config: &Config, shared: &mut Shared) {
-    shared
-        .supply
-        .update_limits(&config.modulator, shared.seen.u.d);
+    let (d, speed) = (shared.seen.u.d, shared.seen.speed);
+    shared.supply.update_limits_at(&config.modulator, d, speed);
 }
 
 /// Updates the bounds of i_q from the supply current.

@@ -160,7 +160,8 @@ mod tests {
     use core::f32::consts::TAU;
 
     use super::*;
-    use crate::control::modulator::{Supply, duties};
+    use crate::control::modulator::Supply;
+    use crate::control::overmodulation::duties;
     use crate::control::transform::{AlphaBeta, PhaseOrder};
     use crate::drive::Config;
     use crate::params::{BOSSO_BENCH, Params, build};
