@@ -11,69 +11,12 @@ use fixed::types::{I1F31, I8F24};
 
 use super::dead_time;
 use super::modulator::{Config, Phases, Supply, whole, whole_duty};
-use super::sensing::Shunts;
 use super::transform::{AlphaBeta, PhaseOrder};
-use crate::math::{Real, SQRT_3, TopProduct};
-use crate::units::{Duty, Speed, TurnedVoltage, Voltage};
-
-/// How far vectors may go beyond those that all phases can switch.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Overmodulation {
-    /// Largest length of the voltage vector, as a share of the supply. The hexagon cuts it.
-    pub vector_max: I1F31,
-    /// Speed from which vectors may be that long: a driver whose phase stays high loses its supply slowly.
-    pub from: Speed,
-    /// Share of the supply that the highest phase has; zero without overmodulation.
-    highest: I1F31,
-    /// Its duty.
-    full: Duty,
-    /// Largest duty of the others, so that both can be read.
-    second: I1F31,
-}
-
-impl Default for Overmodulation {
-    /// None.
-    fn default() -> Self {
-        Self {
-            vector_max: I1F31::ZERO,
-            from: Speed::MAX,
-            highest: I1F31::ZERO,
-            full: Duty::ZERO,
-            second: I1F31::ZERO,
-        }
-    }
-}
-
-/// Longest vector over the highest phase's share: to the hexagon's corners. It leaves a fundamental of 0.609, where a
-/// six-step's is 0.637; a longer one has more of the harmonics that the current regulator counters, and turned no bench's
-/// motor faster.
-const LONGEST: f32 = 2.0 / 3.0;
+use crate::math::TopProduct;
+use crate::units::{Duty, TurnedVoltage, Voltage};
 
 /// More of the period than this beyond the largest duty, 0.4 %, makes the highest phase stay high: not a rounding.
 const NO_LONGER: I1F31 = I1F31::from_bits(1 << 23);
-
-impl Config {
-    /// Returns this modulator with overmodulation from a speed on. With three shunts the highest phase need not switch
-    /// while the others can be read, up to the duty `window`; with two it keeps the largest duty.
-    #[must_use]
-    pub fn overmodulating(mut self, shunts: Shunts, window: f32, from: Speed) -> Self {
-        let (highest, full) = match shunts {
-            // More than the period.
-            Shunts::Three => (I1F31::MAX, Duty::MAX),
-            Shunts::Two => (self.duty_max, whole_duty(self.duty_max)),
-        };
-        let share = highest.to_f32();
-        self.linear = I1F31::from_f32(share / SQRT_3);
-        self.over = Overmodulation {
-            vector_max: I1F31::from_f32(LONGEST * share),
-            from,
-            highest,
-            full,
-            second: self.duty_max.min(I1F31::from_f32(window)),
-        };
-        self
-    }
-}
 
 /// Returns the three duties of a voltage vector that [`limit`](super::modulator::limit) and [`beyond_hexagon`] have
 /// shortened, as [`duties`](super::modulator::duties) does of a short one.
@@ -172,6 +115,7 @@ mod tests {
     use super::*;
     use crate::control::modulator::Modulation;
     use crate::control::sensing::Shunts::{self, Three, Two};
+    use crate::units::Speed;
     use core::f64::consts::TAU;
 
     const MOST: f64 = 0.95;
