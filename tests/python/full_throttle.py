@@ -10,7 +10,6 @@ with status 1 if one does not hold.
 import math
 import random
 import sys
-import tomllib
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -21,22 +20,10 @@ import paths
 sys.path.insert(0, str(paths.DIALECT))
 
 from motors import FROM_MOTOR, drawn_bench, flown, motor_of, tune  # noqa: E402  (they need the dialect's folder)
+from thrust import PROPELLERS, bench  # noqa: E402
 
 MODES = {"speed": 0, "voltage": 2}
-PROPELLERS = [
-    "whoop",
-    "quad-3-inch",
-    "quad-5-inch",
-    "quad-7-inch",
-    "quad-10-inch",
-    "quad-15-inch",
-    "lift-28-inch",
-    "cinelifter",
-    "ducted-fan",
-    "bosso",
-    "helicopter",
-]
-SIX_STEP = 2 / math.pi
+SIX_STEP_SHARE = 2 / math.pi
 """A six-step's fundamental over the supply: no other switching has more."""
 IDLE = 0.055
 CELL_V = 4.1
@@ -83,7 +70,7 @@ class Plant:
             if square < 0:
                 continue
             bus_v = supply_v / 2 + math.sqrt(square)
-            if power_w / bus_v <= self.bus_a and math.hypot(u_d, u_q) <= SIX_STEP * bus_v:
+            if power_w / bus_v <= self.bus_a and math.hypot(u_d, u_q) <= SIX_STEP_SHARE * bus_v:
                 return True
         return False
 
@@ -138,11 +125,11 @@ def opened(folder: Path, tables: dict, plant: Plant, supply: tuple[float, float]
 def of_library(folder: Path, name: str, mode: str, wrong: int) -> Outcome:
     """Opens a bench's throttle. With `wrong` above 0, the draw's number, R and L are stated wrong by up to 30 %, the flux
     by 10 %."""
-    bench = tomllib.loads((paths.ROOT / f"emulator/library/{name}.toml").read_text())
+    tables = bench(name)
     draw = random.Random(f"{name} {mode} {wrong}")
     scale = {key: draw.uniform(0.7, 1.3) for key in "RL"} | {"flux": draw.uniform(0.9, 1.1)} if wrong else {}
-    plant = plant_of(bench["bench"]["motor"], bench["bench"]["load"], bench["params"], scale)
-    bus = bench["bench"]["bus"]
+    plant = plant_of(tables["bench"]["motor"], tables["bench"]["load"], tables["params"], scale)
+    bus = tables["bench"]["bus"]
     pack = isinstance(bus, dict)
     supply = (CELL_V * bus["cells"], bus["resistance_mohm"] * 1e-3) if pack else (bus, 0.0)
     tables = {"bench": {"base": name}, "bench.scale": scale, "params": {}}

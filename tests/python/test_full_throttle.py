@@ -2,7 +2,8 @@
 
 import pytest
 
-from full_throttle import LEAST, LEAST_WRONG, MODES, PROPELLERS, drawn, of_library
+from full_throttle import LEAST, LEAST_WRONG, MODES, drawn, of_library
+from thrust import PROPELLERS
 
 
 @pytest.mark.parametrize("mode", MODES)
