@@ -16,7 +16,7 @@ mod real;
 mod root;
 mod trig;
 
-pub use elementary::{SQRT_3, settled, square_root};
+pub use elementary::{SQRT_3, logarithm, settled, square_root};
 pub use gain::Gain;
 pub(crate) use gain::parts as gain_parts;
 pub use held::Held;

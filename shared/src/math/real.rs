@@ -48,14 +48,14 @@ impl<F: Unsigned> Real for FixedI64<F> {
 /// Returns the bits of a number with this many binary places. Never inlined: every coefficient calls it.
 #[inline(never)]
 fn whole(value: f32, places: i32) -> i32 {
-    libm::rintf(value * power_of_two(places)) as i32
+    round(value * power_of_two(places)) as i32
 }
 
 /// Like [`whole`], unsigned.
 #[inline(never)]
 fn whole_unsigned(value: f32, places: i32) -> u32 {
     // A float's digits beyond 32 bits are zeros.
-    libm::rintf(value * power_of_two(places)) as u32
+    round(value * power_of_two(places)) as u32
 }
 
 /// Like [`whole`], for 64 bits. In halves, since the FPU converts 32 bits and the compiler's 64-bit function is twice
@@ -66,7 +66,7 @@ fn whole_long(value: f32, places: i32) -> i64 {
     let high = (magnitude * power_of_two(places - 32)) as u32;
     // Exact: a float has fewer bits than a half.
     let rest = magnitude - high as f32 * power_of_two(32 - places);
-    let low = libm::rintf(rest * power_of_two(places)) as u32;
+    let low = round(rest * power_of_two(places)) as u32;
     match (high > i32::MAX as u32, value < 0.0) {
         (true, false) => i64::MAX,
         (true, true) => i64::MIN,
@@ -78,8 +78,16 @@ fn whole_long(value: f32, places: i32) -> i64 {
 }
 
 /// Rounds to the nearest whole number, ties to even.
+#[inline(never)] // many call it
 pub fn round(value: f32) -> f32 {
-    libm::rintf(value)
+    // From there on floats are whole, and a sum is rounded to one.
+    const WHOLE: f32 = (1 << 23) as f32;
+    let whole = WHOLE.copysign(value);
+    if value.abs() < WHOLE {
+        value + whole - whole
+    } else {
+        value
+    }
 }
 
 /// Returns 2^`power`, `power` being at most the bits of a type: products with it are exact.

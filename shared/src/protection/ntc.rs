@@ -1,6 +1,6 @@
 //! Temperature from a thermistor reading.
 
-use crate::math::Real;
+use crate::math::{Real, logarithm};
 use crate::units::AdcCounts;
 
 /// Counts of a 12-bit ADC.
@@ -36,7 +36,7 @@ impl Ntc {
             return f32::NAN;
         }
         let ratio = self.pull_down * (COUNTS - counts) / counts;
-        let inverse = 1.0 / (FREEZING_K + 25.0) + libm::logf(ratio) / self.beta_k;
+        let inverse = 1.0 / (FREEZING_K + 25.0) + logarithm(ratio) / self.beta_k;
         1.0 / inverse - FREEZING_K
     }
 }
