@@ -65,9 +65,8 @@ fn parameters() -> String {
 fn parameter(id: ParamId) -> String {
     let (entry, text) = (&TABLE[id as usize], id.text());
     let mut fields = Fields(String::new());
-    fields.text("name", entry.name);
+    // What many have in common stands together, which xz shortens most.
     fields.text("type", "Float");
-    fields.text("shortDesc", text.description);
     fields.text(
         "group",
         if text.is_used() {
@@ -76,6 +75,7 @@ fn parameter(id: ParamId) -> String {
             "Not in this image"
         },
     );
+    fields.text("name", entry.name);
     if !text.unit.is_empty() {
         fields.text("units", text.unit);
     }
@@ -96,6 +96,7 @@ fn parameter(id: ParamId) -> String {
     if text.restart {
         fields.bare("rebootRequired", true);
     }
+    fields.text("shortDesc", text.description);
     if !text.choices.is_empty() {
         let choice = |(value, meaning): &(u8, &str)| {
             let mut fields = Fields(String::new());
