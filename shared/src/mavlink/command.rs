@@ -345,8 +345,7 @@ impl Commands {
         self.last = Some((command, code));
         replies.ack(command.from, command.number, code);
         if let Err(reason) = result {
-            let text = [reason, ""];
-            replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_ERROR, text));
+            replies.text(MavSeverity::MAV_SEVERITY_ERROR, reason);
         }
         // A reset or a load changes every value: clients should see the new ones.
         code == ACCEPTED && command.number == PREFLIGHT_STORAGE && command.choice(0) != Some(1)
@@ -370,13 +369,11 @@ impl Commands {
         }
         // The pilot may open the throttle at any moment.
         if context.authority.armed() {
-            let text = [NO_REBOOT_ARMED, ""];
-            replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_WARNING, text));
+            replies.text(MavSeverity::MAV_SEVERITY_WARNING, NO_REBOOT_ARMED);
             return TEMPORARILY_REJECTED;
         }
         self.reboot = true;
-        let text = ["Rebooting", ""];
-        replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_INFO, text));
+        replies.text(MavSeverity::MAV_SEVERITY_INFO, "Rebooting");
         ACCEPTED
     }
 

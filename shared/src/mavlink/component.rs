@@ -201,7 +201,7 @@ impl Component {
         };
         self.keep |= is_time;
         self.unsign &= !is_time;
-        self.replies.push(Reply::Text(severity, [text, ""]));
+        self.replies.text(severity, text);
     }
 
     /// Restores the key and the signature time stored before the start.
@@ -342,7 +342,7 @@ impl Component {
         };
         let result = if result.is_ok() { ACCEPTED } else { FAILED };
         self.commands.end_calibration(result, &mut self.replies);
-        self.replies.push(Reply::Text(severity, [text, ""]));
+        self.replies.text(severity, text);
     }
 }
 

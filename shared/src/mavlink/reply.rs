@@ -115,6 +115,11 @@ impl Replies {
         });
     }
 
+    #[inline(never)] // as above
+    pub(super) fn text(&mut self, severity: MavSeverity, text: &'static str) {
+        self.push(Reply::Text(severity, [text, ""]));
+    }
+
     /// Reports a command's progress, percent.
     pub(super) fn progress(&mut self, to: Address, command: u16, percent: u8) {
         self.push(Reply::Ack {
