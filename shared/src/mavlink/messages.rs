@@ -103,15 +103,20 @@ pub(super) fn esc_status(payload: &mut Payload, now_us: u64, escs: &Escs) {
 /// Writes ESC_TELEMETRY. It has no signs: speed is its magnitude, and a current into the supply is 0. Those for later
 /// ESCs have the same layout ([`Place::telemetry`](super::place::Place::telemetry)).
 pub(super) fn esc_telemetry(payload: &mut Payload, escs: &Escs, count: u16) {
-    let u16 = |value: f32| u32::from(round(value) as u16);
-    escs.put(payload, 2, 0, |esc| u16(esc.bus_v * 100.0));
-    escs.put(payload, 2, 0, |esc| u16(esc.bus_a * 100.0));
-    escs.put(payload, 2, 0, |esc| u16(esc.consumed_mah));
-    escs.put(payload, 2, 0, |esc| u16(esc.rpm.abs()));
+    escs.put(payload, 2, 0, |esc| whole(esc.bus_v * 100.0));
+    escs.put(payload, 2, 0, |esc| whole(esc.bus_a * 100.0));
+    escs.put(payload, 2, 0, |esc| whole(esc.consumed_mah));
+    escs.put(payload, 2, 0, |esc| whole(esc.rpm.abs()));
     escs.put(payload, 2, 0, |_| count.into());
     escs.put(payload, 1, 0, |esc| {
         u32::from(round(esc.temperature_c) as u8)
     });
+}
+
+/// Returns the nearest number of 16 bits.
+#[inline(never)] // four call it
+fn whole(value: f32) -> u32 {
+    u32::from(round(value) as u16)
 }
 
 pub(super) fn autopilot_version(payload: &mut Payload, image: &Image) {

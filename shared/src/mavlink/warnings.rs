@@ -27,6 +27,7 @@ impl Warnings {
     }
 
     /// Queues a warning; of more than two at once, the first are kept.
+    #[inline(never)] // five call it
     pub(super) fn push(&mut self, warning: Warning) {
         if let Some(place) = self.texts.get_mut(self.come) {
             *place = warning;
