@@ -68,8 +68,8 @@ impl Component {
     pub fn new(params: &Params, image: &Image, link_bytes_per_s: u32) -> Self {
         let identity = Identity::new(params);
         Self {
+            writer: Writer::new(identity.address),
             // Constants are built in place; copies would take 1.6 KB of stack.
-            writer: const { Writer::new() },
             replies: const { Replies::new() },
             list: List::default(),
             list_pace: Pace::new(link_bytes_per_s / 2),
@@ -114,6 +114,7 @@ impl Component {
         let Some(target) = target else {
             if trust == Trust::Full {
                 self.identity.belong_to(frame.from);
+                self.writer.sender.send_as(self.identity.address);
             }
             return;
         };

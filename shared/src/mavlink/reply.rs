@@ -8,7 +8,6 @@ use mavlink::dialects::ardupilotmega::{
 
 use super::frame::Address;
 use super::ftp;
-use super::identity::Identity;
 use super::payload::id_of;
 use super::refusal::Refusal;
 use super::sender::Sender;
@@ -162,9 +161,9 @@ pub(super) struct Writer {
 }
 
 impl Writer {
-    pub(super) const fn new() -> Self {
+    pub(super) const fn new(from: Address) -> Self {
         Self {
-            sender: Sender::new(),
+            sender: Sender::new(from),
             text_id: 0,
         }
     }
@@ -172,7 +171,6 @@ impl Writer {
     /// Sends COMMAND_ACK, as bytes because the dialect may not know the command.
     pub(super) fn ack(
         &mut self,
-        identity: &Identity,
         to: Address,
         command: u16,
         (result, progress): (MavResult, u8),
@@ -192,14 +190,12 @@ impl Writer {
             to.component,
         ];
         let message = id_of::<COMMAND_ACK_DATA>();
-        self.sender
-            .send_payload(identity.address, message, &payload, out);
+        self.sender.send_payload(message, &payload, out);
     }
 
     /// Sends STATUSTEXT, in chunks of 50 bytes if it is longer.
     pub(super) fn text(
         &mut self,
-        identity: &Identity,
         severity: MavSeverity,
         pieces: &[&str],
         out: &mut dyn FnMut(&[u8]),
@@ -229,41 +225,30 @@ impl Writer {
             payload[1..][..CHUNK_LEN].copy_from_slice(part);
             payload[1 + CHUNK_LEN..].copy_from_slice(&[id_low, id_high, chunk as u8]);
             let message = id_of::<STATUSTEXT_DATA>();
-            self.sender
-                .send_payload(identity.address, message, &payload, out);
+            self.sender.send_payload(message, &payload, out);
         }
     }
 
-    pub(super) fn pong(
-        &mut self,
-        identity: &Identity,
-        to: Address,
-        asked: &[u8; PING_LEN],
-        out: &mut dyn FnMut(&[u8]),
-    ) {
+    pub(super) fn pong(&mut self, to: Address, asked: &[u8; PING_LEN], out: &mut dyn FnMut(&[u8])) {
         let mut payload = [0; PING_LEN + 2];
         payload[..PING_LEN].copy_from_slice(asked);
         payload[PING_LEN..].copy_from_slice(&[to.system, to.component]);
-        self.sender
-            .send_payload(identity.address, PING, &payload, out);
+        self.sender.send_payload(PING, &payload, out);
     }
 
     pub(super) fn mission_count(
         &mut self,
-        identity: &Identity,
         to: Address,
         mission_type: u8,
         out: &mut dyn FnMut(&[u8]),
     ) {
         let payload = [0, 0, to.system, to.component, mission_type];
         let message = id_of::<MISSION_COUNT_DATA>();
-        self.sender
-            .send_payload(identity.address, message, &payload, out);
+        self.sender.send_payload(message, &payload, out);
     }
 
     pub(super) fn param_error(
         &mut self,
-        identity: &Identity,
         to: Address,
         (name, index): ([u8; 16], i16),
         error: MavParamError,
@@ -275,7 +260,6 @@ impl Writer {
         payload[4..20].copy_from_slice(&name);
         payload[20] = error as u8;
         let message = id_of::<PARAM_ERROR_DATA>();
-        self.sender
-            .send_payload(identity.address, message, &payload, out);
+        self.sender.send_payload(message, &payload, out);
     }
 }

@@ -16,16 +16,25 @@ const HEADER_LEN: usize = 10;
 /// Numbers outgoing frames. Always MAVLink 2: an ESC's messages have ids above 255.
 #[derive(Clone, Debug)]
 pub(super) struct Sender {
+    /// The identity's address.
+    from: Address,
     sequence: u8,
     pub(super) signing: Signing,
 }
 
 impl Sender {
-    pub(super) const fn new() -> Self {
+    /// Sends as this address.
+    pub(super) const fn new(from: Address) -> Self {
         Self {
+            from,
             sequence: 0,
             signing: Signing::NONE,
         }
+    }
+
+    /// Sends as another address from now on.
+    pub(super) fn send_as(&mut self, from: Address) {
+        self.from = from;
     }
 
     /// Returns the length of a frame without payload.
@@ -41,7 +50,6 @@ impl Sender {
     /// Sends a payload of at most 255 bytes as the message with this id and CRC seed.
     pub(super) fn send_payload(
         &mut self,
-        from: Address,
         (id, extra_crc): (u32, u8),
         payload: &[u8],
         out: &mut dyn FnMut(&[u8]),
@@ -60,8 +68,8 @@ impl Sender {
             if self.signing.signs() { SIGNED } else { 0 },
             0,
             self.sequence,
-            from.system,
-            from.component,
+            self.from.system,
+            self.from.component,
             id_0,
             id_1,
             id_2,

@@ -98,23 +98,19 @@ impl Component {
     }
 
     fn send_reply(&mut self, reply: Reply, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
-        let Self {
-            identity, writer, ..
-        } = self;
+        let writer = &mut self.writer;
         match reply {
             Reply::Ack {
                 to,
                 command,
                 result,
                 progress,
-            } => writer.ack(identity, to, command, (result, progress), send),
+            } => writer.ack(to, command, (result, progress), send),
             Reply::Message(AUTOPILOT_VERSION_DATA::ID) => {
                 let mut payload = Payload::new();
                 messages::autopilot_version(&mut payload, &self.image);
                 let message = id_of::<AUTOPILOT_VERSION_DATA>();
-                writer
-                    .sender
-                    .send_payload(identity.address, message, payload.bytes(), send);
+                writer.sender.send_payload(message, payload.bytes(), send);
             }
             Reply::Message(id) => {
                 if let Some(stream) = self.schedule.find(id) {
@@ -124,22 +120,22 @@ impl Component {
                 }
             }
             Reply::Interval(message) => self.send_interval(message, context.params, send),
-            Reply::Pong { to, asked } => writer.pong(identity, to, &asked, send),
+            Reply::Pong { to, asked } => writer.pong(to, &asked, send),
             Reply::MissionCount { to, mission_type } => {
-                writer.mission_count(identity, to, mission_type, send);
+                writer.mission_count(to, mission_type, send);
             }
             Reply::UnknownParam { to, name, index } => {
                 let error = MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST;
-                writer.param_error(identity, to, (name, index), error, send);
+                writer.param_error(to, (name, index), error, send);
             }
             Reply::Refused { to, id, refusal } => {
                 let place = (messages::name_bytes(id), parameter::BY_NAME);
-                writer.param_error(identity, to, place, refusal.error, send);
+                writer.param_error(to, place, refusal.error, send);
                 let (other, colon) = refusal.because.map_or(("", ""), |b| (b.entry().name, ": "));
                 let pieces = [id.entry().name, " refused: ", other, colon, refusal.reason];
-                writer.text(identity, MavSeverity::MAV_SEVERITY_WARNING, &pieces, send);
+                writer.text(MavSeverity::MAV_SEVERITY_WARNING, &pieces, send);
             }
-            Reply::Text(severity, text) => writer.text(identity, severity, &text, send),
+            Reply::Text(severity, text) => writer.text(severity, &text, send),
             Reply::Ftp { to, ref answer } => self.send_file(to, answer, context, send),
         }
     }
@@ -196,7 +192,7 @@ impl Component {
 
     fn send_payload(&mut self, message: (u32, u8), payload: &Payload, send: &mut dyn FnMut(&[u8])) {
         let sender = &mut self.writer.sender;
-        sender.send_payload(self.identity.address, message, payload.bytes(), send);
+        sender.send_payload(message, payload.bytes(), send);
     }
 
     /// Sends MESSAGE_INTERVAL: -1 if the stream is off, 0 if there is none.
@@ -248,7 +244,7 @@ impl Component {
         let mut payload = [0; ftp::PAYLOAD_MAX];
         answer.write(to, &mut self.files, &view, &mut payload);
         let sender = &mut self.writer.sender;
-        sender.send_payload(self.identity.address, FILE, &payload, send);
+        sender.send_payload(FILE, &payload, send);
     }
 
     #[inline(never)] // as above
@@ -256,7 +252,7 @@ impl Component {
         let message = (id, check::extra_crc(id));
         let payload = ftp::metadata(id, now_us);
         let sender = &mut self.writer.sender;
-        sender.send_payload(self.identity.address, message, &payload, send);
+        sender.send_payload(message, &payload, send);
     }
 
     fn send_value(&mut self, context: &Context, id: ParamId, send: &mut dyn FnMut(&[u8])) {
@@ -266,6 +262,6 @@ impl Component {
     }
 
     fn text(&mut self, severity: MavSeverity, pieces: &[&str], send: &mut dyn FnMut(&[u8])) {
-        self.writer.text(&self.identity, severity, pieces, send);
+        self.writer.text(severity, pieces, send);
     }
 }
