@@ -10,18 +10,15 @@ use crate::params::ParamId;
 use crate::parts::Part;
 use crate::record::{self, Record};
 
-static GENERAL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz"));
-static PARAMETER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/parameter.json.xz"));
+const GENERAL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz"));
+const PARAMETER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/parameter.json.xz"));
 
 /// The metadata of all parameters as ground stations read it, as JSON, for programs that have the table at hand. No
 /// image holds it: what is served is compressed.
 pub const PARAMETER_METADATA: &str = include_str!(concat!(env!("OUT_DIR"), "/parameter.json"));
 
 /// Checksum of the general metadata.
-pub(super) const GENERAL_CHECKSUM: u32 = checksum(
-    0,
-    include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz")),
-);
+pub(super) const GENERAL_CHECKSUM: u32 = checksum(0, GENERAL);
 
 /// The kind of an entry.
 #[derive(Debug)]
@@ -52,7 +49,18 @@ pub(super) struct Entry {
     content: Content,
 }
 
-static ENTRIES: [Entry; 7] = [
+/// The metadata first, and the fault record last: programs without the one or the other leave out these ends.
+static ENTRIES: [Entry; 10] = [
+    Entry {
+        folder: "",
+        name: "general.json.xz",
+        content: fixed(GENERAL),
+    },
+    Entry {
+        folder: "",
+        name: "parameter.json.xz",
+        content: fixed(PARAMETER),
+    },
     Entry {
         folder: "",
         name: "@PARAM",
@@ -88,38 +96,23 @@ static ENTRIES: [Entry; 7] = [
         name: "identify.txt",
         content: Content::Identification,
     },
-];
-
-/// The parameters' metadata, and where it is: separate, like the next one.
-static METADATA: [Entry; 2] = [
     Entry {
-        folder: "",
-        name: "general.json.xz",
-        content: Content::Fixed(GENERAL),
-    },
-    Entry {
-        folder: "",
-        name: "parameter.json.xz",
-        content: Content::Fixed(PARAMETER),
+        folder: "@SYS/",
+        name: "faults.bin",
+        content: Content::Record,
     },
 ];
 
-/// The fault record: separate, so that a program without one has none of it.
-static RECORD: Entry = Entry {
-    folder: "@SYS/",
-    name: "faults.bin",
-    content: Content::Record,
-};
+/// Returns metadata's content; a program without it holds no bytes.
+const fn fixed(bytes: &'static [u8]) -> Content {
+    Content::Fixed(if Part::Metadata.is_here() { bytes } else { &[] })
+}
 
 /// Returns the entries of this program.
-fn entries() -> impl Iterator<Item = &'static Entry> {
-    let metadata: &[Entry] = if Part::Metadata.is_here() {
-        &METADATA
-    } else {
-        &[]
-    };
-    let record = record::KEPT.then_some(&RECORD);
-    metadata.iter().chain(&ENTRIES).chain(record)
+fn entries() -> &'static [Entry] {
+    let first = if Part::Metadata.is_here() { 0 } else { 2 };
+    let end = ENTRIES.len() - if record::KEPT { 0 } else { 1 };
+    &ENTRIES[first..end]
 }
 
 /// Returns the fault record, if this program keeps one.
@@ -143,7 +136,7 @@ impl File {
             Some(at) => (path.get(..at)?, path.get(at + 1..)),
             None => (path, None),
         };
-        let entry = entries().find(|entry| {
+        let entry = entries().iter().find(|entry| {
             path.strip_prefix(entry.folder.as_bytes()) == Some(entry.name.as_bytes())
         })?;
         let selection = match (&entry.content, query) {
