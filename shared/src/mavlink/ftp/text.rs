@@ -90,14 +90,8 @@ fn thousandths(number: f32, sink: &mut Sink) {
         sink.put(b"-");
     }
     decimal(thousandths / 1000, sink);
-    sink.put(b".");
-    // Keeps leading zeros: the digit in front is dropped.
-    let mut digits = [0; 4];
-    let mut place = Sink::new(0, &mut digits);
-    decimal(1000 + thousandths % 1000, &mut place);
-    digits[0] = b' ';
-    digits.rotate_left(1);
-    sink.put(&digits);
+    let digit = |worth: u32| b'0' + (thousandths / worth % 10) as u8;
+    sink.put(&[b'.', digit(100), digit(10), digit(1), b' ']);
 }
 
 /// Returns a number with three decimals, between spaces.
@@ -106,7 +100,10 @@ pub fn digits(number: f32) -> String<16> {
     thousandths(number, &mut Sink::new(0, &mut bytes));
     let mut text = String::new();
     let _ = text.push(' ');
-    for byte in bytes.into_iter().take_while(|byte| *byte > 0) {
+    for byte in bytes
+        .into_iter()
+        .take_while(|byte| (b' '..=b'~').contains(byte))
+    {
         let _ = text.push(char::from(byte));
     }
     text
