@@ -1,5 +1,6 @@
 //! The record as a file: written by the ESC, read by a user's tools.
 
+use core::sync::atomic::AtomicU32;
 use core::sync::atomic::Ordering::Relaxed;
 
 use heapless::Vec;
@@ -21,10 +22,12 @@ impl Record {
         let held = self.get(place::WRITTEN) & HELD != 0;
         let words = if held { place::PERIODS } else { place::WRITTEN };
         let periods = if held { PERIODS } else { 0 };
-        let words = self.words.iter().take(words);
-        for word in words.chain(self.periods.iter().take(periods).flatten()) {
-            put(word.load(Relaxed));
-        }
+        let mut put_all = |words: &[AtomicU32], count: usize| {
+            let words = words.iter().take(count);
+            words.for_each(|word| put(word.load(Relaxed)));
+        };
+        put_all(&self.words, words);
+        put_all(self.periods.as_flattened(), periods * ROW);
     }
 }
 
