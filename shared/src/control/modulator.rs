@@ -136,8 +136,8 @@ traced! {
         pub bus: Voltage,
         /// 1/V with 28 fraction bits, saturating at 8.
         pub reciprocal: InverseVoltage,
-        /// Length up to which the duties make every vector.
-        pub linear: Voltage,
+        /// Length up to which every phase switches: the scale of the throttle in voltage mode.
+        pub switched: Voltage,
         /// Longest available voltage vector.
         pub longest: VectorLimit,
         /// Square of the length up to which every phase can be read.
@@ -205,7 +205,7 @@ impl Supply {
         let mut supply = Self {
             bus,
             reciprocal: InverseVoltage::ZERO,
-            linear: Voltage::ZERO,
+            switched: Voltage::ZERO,
             longest: VectorLimit::NONE,
             readable_square: WideVoltageSquare::ZERO,
         };
@@ -248,7 +248,7 @@ impl Supply {
 
     fn limit_to(&mut self, config: &Config, longest: I1F31, d: Voltage) {
         self.longest = VectorLimit::new(longest.top(self.bus).scaled(), d);
-        self.linear = config.linear.top(self.bus).scaled();
+        self.switched = config.vector_max.top(self.bus).scaled();
         self.readable_square = if config.readable.is_negative() {
             -WideVoltageSquare::DELTA
         } else {

@@ -137,12 +137,13 @@ mod tests {
     /// Returns a vector within the hexagon, and the duties that make it.
     fn made(config: &Config, length: f64, degrees: i32) -> ((f64, f64), [f64; 3]) {
         let supply = supply(config);
+        let linear = Voltage::from_num(config.linear.to_num::<f64>());
         let (sin, cos) = (f64::from(degrees) / 360.0 * TAU).sin_cos();
         let v = AlphaBeta {
             alpha: TurnedVoltage::from_num(length * cos),
             beta: TurnedVoltage::from_num(length * sin),
         };
-        let over = beyond_hexagon(v, supply.linear).unwrap_or_default();
+        let over = beyond_hexagon(v, linear).unwrap_or_default();
         let v = AlphaBeta {
             alpha: v.alpha - over.alpha,
             beta: v.beta - over.beta,

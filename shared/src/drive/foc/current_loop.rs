@@ -10,7 +10,7 @@ use crate::drive::config::Config;
 use crate::drive::io::{Bridge, Sample, hall};
 use crate::drive::phase::Phase;
 use crate::drive::shared::Shared;
-use crate::math::{Held, SinCos, sin_cos};
+use crate::math::{Held, SinCos, TopProduct, sin_cos};
 use crate::units::{Current, Duty, Speed, Voltage, WideVoltage};
 
 /// The control's frame in a period.
@@ -156,9 +156,10 @@ fn limited(
             loops.i_q_shortfall = loops.reference.i.q.minus(shared.seen.i.q);
         }
     }
-    if shared.supply.longest.length() > shared.supply.linear {
+    if shared.supply.longest.length() > shared.supply.switched {
         let v = inverse_park(rotate(u, loops.delay_rotation), angle);
-        if let Some(over) = overmodulation::beyond_hexagon(v, shared.supply.linear) {
+        let linear = config.modulator.linear.top(shared.supply.bus).scaled();
+        if let Some(over) = overmodulation::beyond_hexagon(v, linear) {
             // Back from where the frame will be.
             let Dq { d, q } = park(over, angle);
             let over = park(AlphaBeta { alpha: d, beta: q }, loops.delay_rotation);

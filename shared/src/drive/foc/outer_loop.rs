@@ -181,12 +181,12 @@ fn at_voltage(
     shared: &Shared,
     share: fixed::types::I1F31,
 ) -> Reference {
-    let mut u_q = voltage::of_share(share, shared.supply.linear).max(config.least_u_q);
+    let mut u_q = voltage::of_share(share, shared.supply.switched).max(config.least_u_q);
     if config.weakening.most != Current::ZERO {
         // As if the supply had it all: what i_d takes away is not the throttle's.
         let i_d = foc.loops.weakening.i_d;
         u_q = u_q
-            .plus(voltage::beyond(share, shared.supply.linear))
+            .plus(voltage::beyond(share, shared.supply.switched))
             .plus(config.regulator.induced(&foc.loops.regulator, i_d));
     }
     let frame = (shared.seen.speed, shared.seen.i);
