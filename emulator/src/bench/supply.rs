@@ -22,6 +22,8 @@ pub struct SupplyTable {
     charge: Option<f64>,
     /// Resistance of the whole source; default 4 per cell, or none.
     resistance_mohm: Option<f64>,
+    /// Inductance of the wires to the bus; default none.
+    inductance_uh: Option<f64>,
     /// Capacitance of the bus; default 470.
     capacitance_uf: Option<f64>,
 }
@@ -79,6 +81,10 @@ impl SupplyTable {
                 Some(mohm) => 1e-3 * check("resistance_mohm", mohm, [0.0, 1e5], "mOhm")?,
                 None => usual_ohm,
             },
+            inductance_h: match self.inductance_uh {
+                Some(uh) => 1e-6 * check("inductance_uh", uh, [0.0, 1e3], "uH")?,
+                None => 0.0,
+            },
             capacitance_f: match microfarad {
                 Some(uf) => 1e-6 * check("capacitance_uf", uf, [1.0, 1e7], "uF")?,
                 None => CAPACITANCE_F,
@@ -114,13 +120,14 @@ mod tests {
         for text in ["'6s'", "'6S'", "{ cells = 6 }"] {
             assert_eq!(supply(text).unwrap(), Supply::battery(6), "{text}");
         }
-        let table = "{ volts = 20.0, sinks = false, resistance_mohm = 50, capacitance_uf = 1000 }";
+        let table = "{ volts = 20.0, sinks = false, resistance_mohm = 50, inductance_uh = 2, capacitance_uf = 1000 }";
         let wanted = Supply {
             source: Source::Fixed {
                 volts: 20.0,
                 sinks: false,
             },
             resistance_ohm: 0.05,
+            inductance_h: 2e-6,
             capacitance_f: 1e-3,
         };
         assert_eq!(supply(table).unwrap(), wanted);
@@ -145,6 +152,7 @@ mod tests {
             ("{ cells = 4, sinks = false }", "sinks"),
             ("{ volts = 12.0, charge = 0.5 }", "charge"),
             ("{ volts = 12.0, capacitance_uf = 0 }", "capacitance_uf = 0"),
+            ("{ cells = 4, inductance_uh = -1 }", "inductance_uh = -1"),
         ] {
             let error = supply(text).unwrap_err().to_string();
             assert!(error.contains(word), "{text}: {error}");

@@ -4,12 +4,15 @@
 //! in closed form. The ripple from the PWM edges is left out.
 
 use super::Supply;
+use super::wires::Wires;
 
 /// A supply with the capacitor that it charges.
 #[derive(Clone, Debug)]
 pub struct Bus {
     supply: Supply,
     volts: f64,
+    /// Current in the wires from the source, A; unused where they have no inductance.
+    wires_a: f64,
     /// Charge drawn from the source since the start, C.
     drawn_c: f64,
     /// Voltage that the source lacks, V.
@@ -27,6 +30,7 @@ impl Bus {
         Self {
             volts: supply.open_v(0.0),
             supply,
+            wires_a: 0.0,
             drawn_c: 0.0,
             sag_v: 0.0,
             limit_v: f64::INFINITY,
@@ -83,6 +87,9 @@ impl Bus {
     /// Connects the source, or leaves the bridge to the capacitor alone.
     pub fn connect(&mut self, connected: bool) {
         self.connected = connected;
+        if !connected {
+            self.wires_a = 0.0;
+        }
     }
 
     /// Ends a period in which the bridge took this mean current, A; negative is returned.
@@ -92,6 +99,7 @@ impl Bus {
         }
         let Supply {
             resistance_ohm,
+            inductance_h,
             capacitance_f,
             ..
         } = self.supply;
@@ -100,6 +108,20 @@ impl Bus {
         let before_v = self.volts;
         self.volts = if !self.connected {
             before_v - current_a * time_s / capacitance_f
+        } else if inductance_h > 0.0 {
+            let wires = Wires {
+                resistance_ohm,
+                inductance_h,
+                capacitance_f,
+            };
+            let (state, driven) = ((before_v, self.wires_a), (open_v, current_a));
+            let after = if self.supply.sinks() {
+                wires.both_ways(state, driven, time_s)
+            } else {
+                wires.one_way(state, driven, time_s)
+            };
+            self.wires_a = after.1;
+            after.0
         } else if self.supply.sinks() {
             let settled_v = open_v - resistance_ohm * current_a;
             settled_v + (before_v - settled_v) * decay(time_s, resistance_ohm * capacitance_f)
@@ -170,6 +192,7 @@ mod tests {
         Bus::new(Supply {
             source: Source::Fixed { volts, sinks },
             resistance_ohm,
+            inductance_h: 0.0,
             capacitance_f: 470e-6,
         })
     }

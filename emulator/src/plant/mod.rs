@@ -30,6 +30,7 @@ mod supply;
 mod thermal;
 mod timing;
 mod vector;
+mod wires;
 
 pub use air::Air;
 pub use breaks::{Breaks, LegBreaks};

@@ -7,6 +7,8 @@ pub struct Supply {
     pub source: Source,
     /// Internal resistance, Ω.
     pub resistance_ohm: f64,
+    /// Inductance of the wires to the bus, H; some 1 µH per metre of both. 0 leaves it out.
+    pub inductance_h: f64,
     /// The bus capacitor, F, above 0. A source without resistance that sinks current holds the bus
     /// without it; it counts once the source is disconnected.
     pub capacitance_f: f64,
@@ -55,6 +57,7 @@ impl Supply {
         Self {
             source: Source::Fixed { volts, sinks: true },
             resistance_ohm: 0.0,
+            inductance_h: 0.0,
             capacitance_f: CAPACITANCE_F,
         }
     }
@@ -68,6 +71,7 @@ impl Supply {
                 charge: 1.0,
             },
             resistance_ohm: CELL_OHM * f64::from(cells),
+            inductance_h: 0.0,
             capacitance_f: CAPACITANCE_F,
         }
     }
