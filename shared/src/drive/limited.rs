@@ -12,6 +12,8 @@ pub struct Thresholds {
     /// Supply voltage above which less is returned, as
     /// [`Config::bus_return_v`](crate::protection::Config::bus_return_v).
     pub bus_return_v: Voltage,
+    /// Supply voltage below which less is drawn.
+    pub bus_draw_v: Voltage,
 }
 
 /// A quantity at its bound lies within a sixteenth of it: the regulator's ripple is smaller.
@@ -34,9 +36,16 @@ impl Thresholds {
             reaches(i.d.to_bits(), i.q.to_bits(), near(self.phase).to_bits()),
             Limit::PhaseCurrent,
         );
+        let draws_less = bounds.max < self.phase;
+        let sags = snapshot.bus < self.bus_draw_v;
         note(
-            bounds.max < self.phase && i.q >= near(bounds.max),
+            draws_less && !sags && i.q >= near(bounds.max),
             Limit::BusCurrent,
+        );
+        // The bound may be zero, and the current as much as its noise below it.
+        note(
+            draws_less && sags && i.q >= bounds.max - (self.phase >> NEAR_SHIFT),
+            Limit::SupplySag,
         );
         // There is a bound even without braking, ready but far from the current.
         note(
@@ -91,6 +100,7 @@ mod tests {
         let thresholds = Thresholds {
             phase: protection.phase,
             bus_return_v: protection.bus_return_v,
+            bus_draw_v: protection.bus_draw_v,
         };
         (thresholds, snapshot)
     }
@@ -138,5 +148,21 @@ mod tests {
         only(thresholds.limits(&snapshot), Some(Limit::Duty));
         snapshot.bus = thresholds.bus_return_v + Voltage::DELTA;
         only(thresholds.limits(&snapshot), Some(Limit::BusVoltage));
+    }
+
+    /// A bound of zero binds too: the motor is asked to turn, and the supply does not let it.
+    #[test]
+    fn a_supply_that_sags_binds_and_not_its_current() {
+        for (q, max, wanted) in [
+            (0.5, 0.5, Some(Limit::SupplySag)),
+            (-0.01, 0.0, Some(Limit::SupplySag)),
+            (0.3, 0.5, None),
+            (0.5, 1.0, None),
+        ] {
+            let (thresholds, mut snapshot) = at(0.0, q);
+            snapshot.bus = thresholds.bus_draw_v - Voltage::DELTA;
+            snapshot.bounds.max = Current::from_num(thresholds.phase.to_num::<f64>() * max);
+            only(thresholds.limits(&snapshot), wanted);
+        }
     }
 }

@@ -20,7 +20,7 @@ pub struct Condition {
 
 macro_rules! conditions {
     (
-        $(#[$about:meta])* $name:ident, $(#[$of_set:meta])* $set:ident of $count:literal from $first:literal,
+        $(#[$about:meta])* $name:ident, $(#[$of_set:meta])* $set:ident of $count:literal from $first:literal in $bits:ty,
         $(#[$of_mark:meta])* $mark:ident: $kind:ty;
         $($(#[$doc:meta])* $variant:ident = $number:literal $text:literal $value:expr, $meaning:literal $remedy:literal;)*
     ) => {
@@ -69,7 +69,7 @@ macro_rules! conditions {
 
         $(#[$of_set])*
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-        pub struct $set(u8);
+        pub struct $set($bits);
 
         impl $set {
             /// The empty set.
@@ -112,7 +112,7 @@ macro_rules! conditions {
             }
 
             #[doc = concat!("A bit each, from the number ", stringify!($first), " on.")]
-            pub const fn bits(self) -> u8 {
+            pub const fn bits(self) -> $bits {
                 self.0
             }
 
@@ -137,7 +137,7 @@ conditions! {
     /// A reason why the bridge was turned off.
     Fault,
     /// A set of faults.
-    Faults of 8 from 0,
+    Faults of 8 from 0 in u8,
     /// Its flag in `ESC_FAILURE_FLAGS`; GENERIC if it has none of its own.
     failure_flag: u16;
 
@@ -179,7 +179,7 @@ conditions! {
     /// A limit that the drive respects at the cost of the demand, or a defect that it continues with.
     Limit,
     /// A set of limits.
-    Limits of 8 from 16,
+    Limits of 9 from 16 in u16,
     /// The bit of extended telemetry's status that it raises.
     raises: Option<Raised>;
 
@@ -215,6 +215,10 @@ conditions! {
     PositionSensor = 23 "position sensor defect" Some(Raised::Warning),
         "a Hall sensor does not switch as the others do"
         "keeps running on the others, and without them at speed";
+    /// The supply is near `LIM_BUS_V_MIN`.
+    SupplySag = 24 "supply sag" Some(Raised::Alert),
+        "the supply is less than 8 % above `LIM_BUS_V_MIN`"
+        "draws less: there is no more torque, and none at all just above `LIM_BUS_V_MIN`";
 }
 
 impl Fault {

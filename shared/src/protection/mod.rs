@@ -12,9 +12,14 @@ use crate::math::{Gain, Held, Multiplier, magnitude};
 use crate::trace::traced;
 use crate::units::{AdcCounts, Current, Voltage};
 
-/// Periods by which the supply voltage is extrapolated while braking: 8 for the filter's lag, 16 until a bound is updated
+/// Periods by which the supply voltage is extrapolated: 8 for the filter's lag, 16 until a bound is updated
 /// again, and 24 for the current to follow, three time constants of a current loop with a 48th of the PWM's frequency.
 const AHEAD_PERIODS: i32 = 48;
+
+/// log2 of how much more slowly a sagging supply moves the bound of i_q than `LIM_BUS_A` does. There the voltage closes a
+/// second loop around the bound, whose gain is the source's resistance times [`Config::bus_draw_slope`]: 6 where the
+/// full current takes 35 % of the supply's voltage.
+const SAG_SHIFT: u32 = 3;
 
 /// Consecutive samples above the trip level that count as over-current; a single disturbed reading does not.
 const OVER_CURRENT_SAMPLES: u8 = 2;
@@ -33,6 +38,10 @@ pub struct Config {
     pub phase: Current,
     /// Bound on the current from the supply, `LIM_BUS_A`.
     pub bus_draw: Current,
+    /// Supply voltage at which nothing more is drawn.
+    pub bus_draw_v: Voltage,
+    /// From volts above that to the current that may be drawn.
+    pub bus_draw_slope: Gain<Voltage, Current>,
     /// Bound on the current into the supply, `LIM_REGEN_A`.
     pub bus_return: Current,
     /// Supply voltage above which less is returned.
@@ -160,7 +169,11 @@ fn burning_current(config: &Config, state: &State) -> Current {
 }
 
 /// Moves the bounds of i_q, every `periods` periods, so that the supply delivers at most `bus_draw` and sinks at
-/// most `bus_return`, less as its voltage nears the limit.
+/// most `bus_return`, each of them less as its voltage nears the limit on that side.
+///
+/// A source that sags does so as fast as the current grows, in a few milliseconds. Where it would soon deliver too much
+/// for its voltage, the current therefore grows no further; from there the bound moves as slowly as the loop through
+/// the source's resistance needs.
 ///
 /// A supply that no longer sinks current rises by volts per millisecond. The bound therefore uses the extrapolated
 /// voltage; where that exceeds the limit, return stops at once.
@@ -173,9 +186,14 @@ pub fn bound(
     (bus_current, i_q): (Current, Current),
     periods: u32,
 ) {
-    let may_return = may_return(config, state);
+    let ahead = state.bus.plus(state.rise.saturating_mul_int(AHEAD_PERIODS));
+    let may_return = may_return(config, ahead);
     let bounds = &mut state.bounds;
-    let too_much_drawn = bus_current.minus(config.bus_draw);
+    if bus_current > may_draw(config, ahead) {
+        bounds.max = bounds.max.min(i_q.max(Current::ZERO));
+    }
+    let too_much_for_sag = bus_current.minus(may_draw(config, state.bus)) >> SAG_SHIFT;
+    let too_much_drawn = bus_current.minus(config.bus_draw).max(too_much_for_sag);
     if too_much_drawn.is_positive() || bounds.max != config.phase {
         let lowered = bounds.max.minus(change(config, too_much_drawn, periods));
         bounds.max = lowered.min(config.phase).max(Current::ZERO);
@@ -206,9 +224,14 @@ fn change(config: &Config, excess: Current, periods: u32) -> Current {
     change.saturating_mul_int(periods as i32)
 }
 
+/// Returns the current that the supply may deliver at this voltage; negative near the lower limit.
+#[inline(never)] // two callers
+fn may_draw(config: &Config, bus: Voltage) -> Current {
+    config.bus_draw_slope.held(bus.minus(config.bus_draw_v))
+}
+
 /// Returns the current that the supply may sink at its extrapolated voltage; negative beyond the limit.
-fn may_return(config: &Config, state: &State) -> Current {
-    let ahead = state.bus.plus(state.rise.saturating_mul_int(AHEAD_PERIODS));
+fn may_return(config: &Config, ahead: Voltage) -> Current {
     let above = ahead.minus(config.bus_return_v);
     if above.is_positive() {
         let less = config.bus_return_slope.held(above);

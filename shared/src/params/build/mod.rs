@@ -108,6 +108,13 @@ const RETURN_BAND_V: f32 = 1.0;
 /// Volts over which the returned current is reduced to zero; measuring it and the voltage takes the rest of the band.
 const RETURN_V: f32 = 0.5;
 
+/// `LIM_BUS_V_MIN` over which the drawn current is reduced, 0.2 V of a lithium cell's 3.3 V, and the least such voltage, V.
+const DRAW_SHARE: f32 = 0.0625;
+const DRAW_LEAST_V: f32 = 0.25;
+
+/// Share of that below which nothing more is drawn: the ripple of the supply's voltage is smaller.
+const DRAW_NONE_SHARE: f32 = 0.25;
+
 /// i_d at `LIM_BUS_V_MAX` over `LIM_PHASE_A`: 4 W on the bench, where zero i_q returns 1 W.
 const BURN_SHARE: f32 = 0.25;
 
@@ -236,10 +243,17 @@ pub(crate) fn test_current(params: &Params, scale: &Scale) -> Current {
 /// Returns the thresholds at which limits bind.
 pub(crate) fn thresholds(params: &Params, scale: &Scale) -> Thresholds {
     let return_v = params.get(ParamId::LimBusVMax) - RETURN_BAND_V;
+    let draw_v = params.get(ParamId::LimBusVMin) + (1.0 + DRAW_NONE_SHARE) * draw_v(params);
     Thresholds {
         phase: scale.current_from_a(params.get(ParamId::LimPhaseA)),
         bus_return_v: Voltage::from_f32(return_v / scale.voltage_v),
+        bus_draw_v: Voltage::from_f32(draw_v / scale.voltage_v),
     }
+}
+
+/// Returns the volts over which the drawn current is reduced.
+fn draw_v(params: &Params) -> f32 {
+    (DRAW_SHARE * params.get(ParamId::LimBusVMin)).max(DRAW_LEAST_V)
 }
 
 /// Returns the number of consecutive periods for which the observer's state may be out of range.
@@ -370,6 +384,10 @@ fn limits(p: &Si, place: &mut protection::Config) {
     place.bus_max = p.voltage(p.supply_max_v);
     place.phase = current(ParamId::LimPhaseA);
     place.bus_draw = current(ParamId::LimBusA);
+    let draw_v = draw_v(p.params);
+    let draw_a = p.get(ParamId::LimBusA).min(p.limit_a);
+    place.bus_draw_v = p.voltage(p.get(ParamId::LimBusVMin) + DRAW_NONE_SHARE * draw_v);
+    place.bus_draw_slope = p.gain(ParamId::LimBusA, draw_a / draw_v * p.unit_v / p.unit_a);
     place.bus_return = current(ParamId::LimRegenA);
     place.bus_return_v = p.voltage(p.supply_max_v - RETURN_BAND_V);
     place.bus_return_slope = p.gain(ParamId::LimRegenA, regen_a / RETURN_V * p.unit_v / p.unit_a);
