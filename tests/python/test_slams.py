@@ -14,9 +14,7 @@ LIBRARY = ["bosso", "quad-3-inch", "quad-5-inch", "quad-7-inch", "quad-10-inch",
 @pytest.mark.parametrize("bench", LIBRARY)
 def test_a_bench_of_the_library_keeps_its_rotor_through_slams(tmp_path, bench, mode, plant):
     draw = random.Random(f"{bench} {mode} {plant}")
-    # At a 3-inch motor's 60 kHz, 750 ns is a twentieth of the period: there the angle is known to 50 degrees.
-    dead_times_ns = DEAD_TIMES_NS[:-1] if bench == "quad-3-inch" else DEAD_TIMES_NS
-    params = {"CTL_MODE": mode, "PWM_DEADTIME_NS": draw.choice(dead_times_ns)}
+    params = {"CTL_MODE": mode, "PWM_DEADTIME_NS": draw.choice(DEAD_TIMES_NS)}
     tables = {"bench": {"base": bench, "plant": plant}, "params": params}
     outcome = slammed(tmp_path, draw, tables, steps=150)
     assert outcome.holds(), outcome

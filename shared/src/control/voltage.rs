@@ -9,7 +9,7 @@ use fixed::types::I1F31;
 
 use super::regulator::{self, Feedback, Reference};
 use super::transform::Dq;
-use crate::math::TopProduct;
+use crate::math::{Held, TopProduct};
 use crate::units::{Current, Voltage};
 
 /// Returns the voltage for a share, −1 to 1, of the longest vector the supply allows.
@@ -26,6 +26,16 @@ pub fn beyond(share: I1F31, vector_max: Voltage) -> Voltage {
     let more = share.max(FASTER_FROM) - FASTER_FROM;
     // The whole throttle adds 16·(3/16)², 0.56.
     of_share(more, of_share(more, vector_max)) << 4
+}
+
+/// Returns what is added to the voltage where the rotor turns more slowly than at the least one: the back-EMF that it
+/// lacks, so that a loss takes half as much of the speed; with twice that some motors' speed begins to swing.
+///
+/// Near zero current the dead time's loss is not known well enough to be compensated. At 750 ns and 60 kHz it is 0.9 V,
+/// where a 3-inch motor idles at 0.5 V.
+pub fn lift(least: Voltage, emf: Voltage) -> Voltage {
+    // No more than at rest, where a rotor turns backwards; and none where there is no least voltage.
+    least.minus(emf).min(least).max(Voltage::ZERO)
 }
 
 /// Returns the reference with the i_q at which the regulator outputs `u_q`.
@@ -45,4 +55,23 @@ pub fn reference(
     };
     let i_q = config.current_at(state, &reference, fb, u_q);
     reference.with_i_q(i_q)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rotor_below_the_least_speed_gets_more_voltage() {
+        for (least, emf, wanted) in [
+            (0.5, 0.5, 0.0),
+            (0.5, 0.75, 0.0),
+            (0.5, 0.25, 0.25),
+            (0.5, -1.0, 0.5),
+            (0.0, -1.0, 0.0),
+        ] {
+            let lift = lift(Voltage::from_num(least), Voltage::from_num(emf));
+            assert_eq!(lift, Voltage::from_num(wanted), "{emf}");
+        }
+    }
 }

@@ -12,7 +12,7 @@ use crate::drive::seen::bus_current;
 use crate::drive::shared::Shared;
 use crate::math::{Held, sin_cos};
 use crate::protection;
-use crate::units::{Current, Speed};
+use crate::units::{Current, Speed, stated_emf};
 
 /// Pieces that prepare a drive, one per period.
 pub(in crate::drive) const PREPARATION_PIECES: u32 = 5;
@@ -181,7 +181,10 @@ fn at_voltage(
     shared: &Shared,
     share: fixed::types::I1F31,
 ) -> Reference {
-    let mut u_q = voltage::of_share(share, shared.supply.switched).max(config.least_u_q);
+    let least = config.least_u_q;
+    let mut u_q = voltage::of_share(share, shared.supply.switched).max(least);
+    // At idle the dead time may take more than the back-EMF.
+    u_q = u_q.plus(voltage::lift(least, stated_emf(shared.seen.speed)));
     if config.weakening.most != Current::ZERO {
         // As if the supply had it all: what i_d takes away is not the throttle's.
         let i_d = foc.loops.weakening.i_d;
