@@ -65,6 +65,19 @@ traced! {
     }
 }
 
+impl State {
+    /// Creates the state of a frame that turns at `omega_s` with a rotor at `theta`, at the next sample: no Park is
+    /// needed.
+    pub fn aligned_to(theta: Angle, omega_s: Speed) -> Self {
+        Self {
+            frame: theta.wrapping_sub(QUARTER_TURN),
+            charge: Charge::MAX,
+            omega_s,
+            ..Self::default()
+        }
+    }
+}
+
 impl Default for State {
     fn default() -> Self {
         Self {
@@ -84,10 +97,12 @@ pub fn aligned(config: &Config, state: &State) -> bool {
     state.charge >= config.park_charge
 }
 
-/// Runs `periods` of Park with this current: sets the frame's speed. Returns whether the rotor had
+/// Runs `periods` of Park with this current: sets the frame's speed. Returns true, and does nothing, if the rotor has
 /// already had its time.
 pub fn park(config: &Config, state: &mut State, current: Current, periods: u32) -> bool {
-    let over = aligned(config, state);
+    if aligned(config, state) {
+        return true;
+    }
     state.charge += current.over_periods(periods);
     let sweeping = state.charge < config.park_charge >> 1;
     state.omega_s = if sweeping {
@@ -95,7 +110,7 @@ pub fn park(config: &Config, state: &mut State, current: Current, periods: u32) 
     } else {
         Speed::ZERO
     };
-    over
+    false
 }
 
 /// Runs Ramp with this current: sets the frame's acceleration.

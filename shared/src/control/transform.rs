@@ -4,7 +4,7 @@ use fixed::types::{I0F32, I1F31};
 
 use crate::math::{Held, Number, SinCos, TopProduct, TopSum};
 use crate::trace::{Trace, traced};
-use crate::units::{AdcCounts, Angle, Current, TurnedVoltage, Voltage};
+use crate::units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage};
 
 traced! {
     /// A vector in the stator's frame.
@@ -57,10 +57,20 @@ impl PhaseOrder {
         sign: -1,
     };
 
+    /// Returns the order for a control that sees phases b and c swapped, or not.
+    pub const fn of(swapped: bool) -> Self {
+        if swapped { Self::SWAPPED } else { Self::NORMAL }
+    }
+
     /// Converts an angle in this phase order's frame to one in the order a, b, c.
     #[inline(always)] // in each period
     pub fn angle(self, theta: Angle) -> Angle {
         theta.wrapping_mul_int(self.sign)
+    }
+
+    /// Converts a speed likewise.
+    pub fn speed(self, omega: Speed) -> Speed {
+        omega * self.sign
     }
 }
 

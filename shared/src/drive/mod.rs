@@ -77,6 +77,8 @@
 //!   +--- Coasts (Run, Stopping), Failed (Ramp, Run, Stopping), Tripped (any)
 //!
 //!  Idle -- Shorted --> Brake
+//!
+//!  Charge, Stopping, Brake -- Followed --> Park: a rotor that turns slowly, or slowed down the other way
 //! ```
 //!
 //! # File order

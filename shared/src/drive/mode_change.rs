@@ -1,6 +1,7 @@
 //! The mode change that a set-point asks for.
 
 use super::config::{Config, Stop};
+use super::foc::{begin, brake};
 use super::io::{Rotation, Setpoint};
 use super::phase::Phase;
 use super::shared::Shared;
@@ -46,6 +47,7 @@ fn driving(config: &Config, shared: &mut Shared, phase: Phase, setpoint: &Setpoi
 }
 
 /// Handles set-points while nothing drives.
+#[inline(never)] // not in field-oriented control's periods
 fn at_rest(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Why> {
     let pulls = matches!(setpoint, Setpoint::Pull(_));
     let wants_tone = match setpoint {
@@ -76,8 +78,10 @@ fn at_rest(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Wh
 }
 
 /// Handles a request to turn while nothing drives.
-fn start(config: &Config, state: &State, phase: Phase, setpoint: &Setpoint) -> Option<Why> {
-    let shared = &state.shared;
+fn start(config: &Config, state: &mut State, phase: Phase, setpoint: &Setpoint) -> Option<Why> {
+    // Else the drive that has just ended is not forgotten yet.
+    let knows = !state.begins_rest();
+    let shared = &mut state.shared;
     let begins = matches!(phase, Phase::Idle | Phase::Brake).then_some(Why::Drive);
     if let Some(six_step) = &config.six_step {
         let position = six_step::given::position(config, &state.foc.observer, shared);
@@ -93,6 +97,11 @@ fn start(config: &Config, state: &State, phase: Phase, setpoint: &Setpoint) -> O
         && shared.seen.speed > config.slow
     {
         Some(Why::Resumed)
+    } else if phase == Phase::Brake && knows && brake::knows(config, &state.foc, shared) {
+        let omega = state.foc.loops.phase_order.speed(shared.seen.speed);
+        let rotor = (shared.seen.angle, omega);
+        begin::follow(config, &mut state.foc, shared, rotor, setpoint);
+        Some(Why::Followed)
     } else {
         begins
     }

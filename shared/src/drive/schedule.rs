@@ -201,5 +201,8 @@ pub(super) fn is_start(slot: Slot) -> bool {
     slot >= CYCLE as u8
 }
 
+/// The slot just before the one in which a start with an aligned rotor tells the observer.
+pub(super) const ALIGNED: Slot = 0;
+
 /// The slot just before the first of a cycle.
 pub(super) const LAST: Slot = CYCLE as u8 - 1;

@@ -23,6 +23,8 @@ traced! {
         pub(super) reversed: bool,
         /// Failed attempts of a start.
         pub(super) failed_starts: u8,
+        /// The present attempt has begun with a rotor that something turned against the demand.
+        pub(super) against: bool,
         pub(super) progress: Progress,
         pub(super) protection: protection::State,
         /// Current offsets.
@@ -103,6 +105,7 @@ impl Shared {
             },
             reversed: false,
             failed_starts: 0,
+            against: false,
             progress: Progress::default(),
             protection: protection::State::new(&config.protection),
             zeros: sensing::State::default(),
@@ -120,6 +123,7 @@ impl Shared {
     #[inline(never)] // two callers
     pub(super) fn start_succeeded(&mut self, config: &Config) {
         self.failed_starts = 0;
+        self.against = false;
         self.latch.retry_periods = config.retry_periods;
         // With sensors, or the six-step drive, an attempt takes too long.
         if config.slow_periods == 0 && config.retry_periods > 0 && config.six_step.is_none() {
@@ -131,6 +135,11 @@ impl Shared {
     #[cold]
     #[inline(never)] // one copy for both drives
     pub(super) fn start_failed(&mut self) -> Why {
+        if self.against {
+            // A rotor that turns is not stuck: once what turns it is weaker, the next attempt succeeds.
+            self.failed_starts = (self.failed_starts + 1) % ATTEMPTS as u8;
+            return Why::Failed;
+        }
         let quick = &mut self.latch.quick_attempts;
         if *quick > 0 {
             *quick -= 1;

@@ -192,7 +192,7 @@ fn combined_slice(
 ) -> Option<Why> {
     let State { foc, shared, .. } = state;
     if due.includes(Work::ROTOR)
-        && let Some(why) = open_loop::rotor_mode_change(config, foc, shared, state.phase)
+        && let Some(why) = open_loop::rotor_mode_change(config, foc, shared, state.phase, setpoint)
     {
         return Some(why);
     }

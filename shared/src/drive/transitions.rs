@@ -37,6 +37,8 @@ pub(super) enum Why {
     Resumed,
     /// Nothing is left to slow down.
     Stopped,
+    /// The rotor turns slowly, or no longer fast the other way, and is known: a ramp begins with it.
+    Followed,
     /// Loss of synchronism in a start, or Run too slow for too long: to Idle, where a set-point that still asks to
     /// turn begins another attempt.
     Failed,
@@ -53,7 +55,7 @@ pub(super) const fn next(from: Phase, why: Why, stop: Stop) -> Option<Phase> {
         (Sense | Charge, Why::Released | Why::TooFast) | (Tone, Why::Released) => Idle,
         (Idle | Tone, Why::Shorted) => Brake,
         (Charge, Why::ToneReady) => Tone,
-        (Charge, Why::Stands) => Park,
+        (Charge, Why::Stands) | (Charge | Stopping | Brake, Why::Followed) => Park,
         (Charge, Why::Caught) => Run,
         (Charge, Why::CaughtBackwards) => Stopping,
         (Park, Why::Aligned) => Ramp,
@@ -76,7 +78,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    const ALL: [Why; 17] = [
+    const ALL: [Why; 18] = [
         Why::Drive,
         Why::Tone,
         Why::Released,
@@ -92,6 +94,7 @@ mod tests {
         Why::HandedOver,
         Why::Resumed,
         Why::Stopped,
+        Why::Followed,
         Why::Failed,
         Why::Tripped(Fault::OverCurrent),
     ];
@@ -117,7 +120,8 @@ mod tests {
         }
         // The low sides have kept the drivers charged.
         let driving: Vec<_> = led_to(Phase::Brake);
-        assert!(driving.iter().all(|to| !to.drives() || *to == Phase::Run));
+        let begun = [Phase::Park, Phase::Run];
+        assert!(driving.iter().all(|to| !to.drives() || begun.contains(to)));
     }
 
     #[test]

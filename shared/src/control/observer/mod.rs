@@ -225,16 +225,22 @@ pub fn begin(
     }
 }
 
-/// Begins with the aligned rotor at rest at `theta`, with the current `i`.
-pub fn begin_aligned(config: &Config, state: &mut State, theta: Angle, i: AlphaBeta<Current>) {
+/// Begins with the aligned rotor, which turns at `omega`, if at all, and is at `theta` at the next sample, with the
+/// current `i`.
+pub fn begin_aligned(
+    config: &Config,
+    state: &mut State,
+    (theta, omega): (Angle, Speed),
+    i: AlphaBeta<Current>,
+) {
     match config {
         // The former works in the frame that the start imposes, the latter needs no start.
         Config::BackEmf(..) | Config::Given(_) => {}
         Config::Edges(config) => {
-            edges::begin(config, &mut state.edges, theta, Speed::ZERO, phases(i));
+            edges::begin(config, &mut state.edges, theta, omega, phases(i));
         }
         Config::Compensated(config) => {
-            compensated::begin(config, &mut state.compensated, (theta, Speed::ZERO), i);
+            compensated::begin(config, &mut state.compensated, (theta, omega), i);
         }
     }
 }

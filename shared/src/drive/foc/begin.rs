@@ -3,9 +3,9 @@
 use super::outer_loop::{self, PREPARATION_PIECES};
 use super::state::State;
 use crate::control::catch::Rotor;
-use crate::control::observer;
 use crate::control::regulator::Reference;
 use crate::control::transform::{AlphaBeta, Dq, PhaseOrder, inverse_park, rotate, voltages};
+use crate::control::{observer, start};
 use crate::drive::config::{Config, Direction};
 use crate::drive::io::{Rotation, Sample, Setpoint, hall};
 use crate::drive::schedule;
@@ -59,7 +59,16 @@ pub(in crate::drive) fn begin(
         }
         (PREPARATION_PERIODS, _) => {
             let omega = turning.map(|(_, omega)| omega);
-            return Some(enter_drive(config, foc, shared, sample, setpoint, omega));
+            let begun = enter_drive(config, foc, shared, sample, setpoint, omega);
+            return Some(match rotor {
+                Rotor::Turning { theta, omega }
+                    if begun == Why::Stands && !config.observer.follows_park() =>
+                {
+                    follow(config, foc, shared, (theta, omega), setpoint);
+                    Why::Followed
+                }
+                _ => begun,
+            });
         }
         _ => {}
     }
@@ -96,21 +105,23 @@ fn enter_drive(
     foc.loops.slot = schedule::LAST;
     if omega.is_none() {
         shared.reversed = backward;
+        shared.against = false;
     }
     let swapped = shared.swapped(config);
-    foc.loops.phase_order = if swapped {
-        PhaseOrder::SWAPPED
-    } else {
-        PhaseOrder::NORMAL
-    };
+    foc.loops.phase_order = PhaseOrder::of(swapped);
     let speed = &mut foc.loops.speed;
     if let Some(omega) = omega {
         config.speed.preset(speed, omega, Current::ZERO);
         // A rotor that turns the other way is stopped first.
-        if shared.reversed == backward {
-            Why::Caught
-        } else {
+        let was_against = shared.against;
+        shared.against = shared.reversed != backward;
+        if shared.against {
+            if !was_against {
+                shared.failed_starts = 0;
+            }
             Why::CaughtBackwards
+        } else {
+            Why::Caught
         }
     } else {
         let (frame, hall) = (foc.loops.start.frame, hall(sample, swapped));
@@ -121,6 +132,30 @@ fn enter_drive(
             Why::Stands
         }
     }
+}
+
+/// Begins a ramp with a frame that turns with the rotor, which is at this angle and speed for the phase order a, b, c:
+/// Park would not hold one that the wind turns.
+#[cold]
+#[inline(never)] // three callers
+pub(in crate::drive) fn follow(
+    config: &Config,
+    foc: &mut State,
+    shared: &mut Shared,
+    (theta, omega): (Angle, Speed),
+    setpoint: &Setpoint,
+) {
+    shared.reversed = setpoint.rotation(config.both_ways) == Rotation::Backward;
+    let order = PhaseOrder::of(shared.swapped(config));
+    let (theta, omega) = (order.angle(theta), order.speed(omega));
+    shared.against = omega.is_negative();
+    shared.progress = Default::default();
+    let loops = &mut foc.loops;
+    loops.phase_order = order;
+    loops.start = start::State::aligned_to(theta.wrapping_add(omega.over_period()), omega);
+    loops.slot = schedule::ALIGNED;
+    let supply = &mut shared.supply;
+    supply.limit_as_from(&config.modulator, config.start_bus);
 }
 
 /// Resumes driving from the present speed and current.

@@ -15,6 +15,12 @@ use crate::units::{AdcCounts, Current, Speed};
 /// Slots between two pieces of preparation.
 const PREPARATION_SLOTS: u32 = 4;
 
+/// Returns true if the rotor turns and the observer knows how: something drives it against the short circuit.
+pub(in crate::drive) fn knows(config: &Config, foc: &State, shared: &Shared) -> bool {
+    let lost = config.observer.follows_park() || foc.observer.slow_estimate.lost;
+    shared.seen.speed != Speed::ZERO && !lost
+}
+
 /// Runs the observer on. With the low sides on the voltage is known to be zero, so the speed can be
 /// reported until the back-EMF drowns in noise.
 #[inline(never)] // only some periods
@@ -50,7 +56,7 @@ pub(in crate::drive) fn watch(
         observer.advance(&mut foc.observer, &fb, u);
     }
     // An eighth of the speed at which Run ends: 19 rpm with the defaults.
-    let turns = estimate.omega_bar.to_bits() > config.slow.to_bits() >> 3;
+    let turns = estimate.omega_bar.saturating_abs() > config.slow >> 3;
     shared.seen = Seen {
         phase: Phase::Brake,
         angle: loops.phase_order.angle(estimate.theta),

@@ -1,6 +1,6 @@
 //! Field-oriented control: open-loop start, flying start, Run, Stopping, and Brake with its observer.
 //!
-//! Each file uses those before it: `state`, `current_loop`, `open_loop`, `outer_loop`, `begin`, `brake`, `period`.
+//! Each file uses those before it: `state`, `current_loop`, `outer_loop`, `begin`, `open_loop`, `brake`, `period`.
 
 pub(super) mod begin;
 pub(super) mod brake;

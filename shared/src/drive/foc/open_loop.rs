@@ -1,11 +1,12 @@
 //! The open-loop start, Park and Ramp, and mode changes caused by the rotor.
 
+use super::begin;
 use super::state::State;
 use crate::control::regulator::Reference;
 use crate::control::transform::{AlphaBeta, Dq, rotate_frame};
 use crate::control::{PERIODS, observer, start};
 use crate::drive::config::{ATTEMPTS, Config};
-use crate::drive::io::Setpoint;
+use crate::drive::io::{Rotation, Setpoint};
 use crate::drive::phase::Phase;
 use crate::drive::schedule::{CYCLE, DAMP_PERIODS};
 use crate::drive::shared::Shared;
@@ -14,9 +15,19 @@ use crate::math::SinCos;
 use crate::protection::Fault;
 use crate::units::{Current, QUARTER_TURN};
 
-/// The coefficients of the attempt that is being made.
+/// Time after which a rotor that something turns the other way has been braked in vain, over that in which a start is
+/// proven: 1.2 s.
+const STOP_PROVEN: u32 = 4;
+
+/// The coefficients of the attempt that is being made. What turns the rotor the other way leaves no time for less than
+/// the quick attempt's current.
 fn attempt<'a>(config: &'a Config, shared: &Shared) -> &'a start::Config {
-    let n = if shared.latch.quick_attempts > 0 {
+    let quick = if shared.against {
+        shared.failed_starts == 0
+    } else {
+        shared.latch.quick_attempts > 0
+    };
+    let n = if quick {
         0
     } else {
         usize::from(shared.failed_starts) + 1
@@ -62,13 +73,14 @@ pub(in crate::drive) fn current(
     }
 }
 
-/// Expects the rotor's flux along the current, on the frame's q axis.
+/// Expects the rotor's flux along the current, on the frame's q axis, and turning with it.
 fn expect_aligned(config: &Config, foc: &mut State, shared: &Shared) {
     let frame = foc.loops.start.frame;
     let rotor = frame.wrapping_add(QUARTER_TURN);
     let Dq { d: alpha, q: beta } = rotate_frame(shared.seen.i, SinCos::of(frame.wrapping_neg()));
     let i = AlphaBeta { alpha, beta };
-    observer::begin_aligned(&config.observer, &mut foc.observer, rotor, i);
+    let omega = foc.loops.start.omega_s;
+    observer::begin_aligned(&config.observer, &mut foc.observer, (rotor, omega), i);
 }
 
 /// Every [`CYCLE`], returns the mode change the rotor calls for: another attempt if it has not followed or has
@@ -79,6 +91,7 @@ pub(in crate::drive) fn rotor_mode_change(
     foc: &mut State,
     shared: &mut Shared,
     phase: Phase,
+    setpoint: &Setpoint,
 ) -> Option<Why> {
     let lost = foc.observer.slow_estimate.lost && !phase.is_open_loop();
     let progress = &mut shared.progress;
@@ -108,7 +121,7 @@ pub(in crate::drive) fn rotor_mode_change(
             progress.slow_periods += CYCLE;
             (progress.slow_periods > config.slow_periods).then(|| shared.start_failed())
         }
-        Phase::Stopping if slow => Some(Why::Stopped),
+        Phase::Stopping => stopping(config, foc, shared, setpoint),
         Phase::Run if progress.run_periods < config.proven_periods => {
             progress.run_periods += CYCLE;
             if progress.run_periods >= config.proven_periods {
@@ -118,6 +131,51 @@ pub(in crate::drive) fn rotor_mode_change(
         }
         _ => None,
     }
+}
+
+/// Ends a stop, at the speed below which the observer does not lead. If the motor is to turn the other way, a ramp takes
+/// the rotor there, from twice that speed: in the wind it would gain speed again while it waited for the next start, and
+/// what the observer allows to brake with near that speed may hold the wind's torque and no more.
+fn stopping(
+    config: &Config,
+    foc: &mut State,
+    shared: &mut Shared,
+    setpoint: &Setpoint,
+) -> Option<Why> {
+    let drives = setpoint.rotation(config.both_ways) != Rotation::Rest;
+    if !drives || shared.is_along(config, setpoint) || config.observer.follows_park() {
+        return (shared.seen.speed < config.slow).then_some(Why::Stopped);
+    }
+    if shared.seen.speed < config.slow * 2 {
+        turn_round(config, foc, shared, setpoint);
+        return Some(Why::Followed);
+    }
+    // What turns the rotor may be too strong.
+    let periods = &mut shared.progress.slow_periods;
+    *periods += CYCLE;
+    let vain = shared.against && *periods > STOP_PROVEN * config.proven_periods;
+    vain.then(|| shared.start_failed())
+}
+
+/// Begins a ramp from a rotor that is braked.
+#[cold]
+fn turn_round(config: &Config, foc: &mut State, shared: &mut Shared, setpoint: &Setpoint) {
+    let omega = foc.loops.phase_order.speed(shared.seen.speed);
+    begin::follow(config, foc, shared, (shared.seen.angle, omega), setpoint);
+    let loops = &mut foc.loops;
+    for v in &mut loops.commanded_voltages {
+        v.beta = -v.beta;
+    }
+    // The voltage continues unchanged: the other phase order mirrors q, and the new frame is a quarter turn behind.
+    let (u, i) = (shared.seen.u, shared.seen.i);
+    let (u, i) = (Dq { d: u.q, q: u.d }, Dq { d: i.q, q: i.d });
+    let factor = loops.inductance.factor;
+    let omega = loops.start.omega_s;
+    let fb = config.observer.feedback(&foc.observer, (omega, i), factor);
+    loops.reference = Reference::steady(i.q).with_i_d(i.d);
+    config
+        .regulator
+        .preset(&mut loops.regulator, u, &loops.reference, &fb);
 }
 
 /// Prepares the speed regulator for [`hand_over`], shortly before it.

@@ -117,32 +117,29 @@ fn with_both_directions_a_rotor_that_turns_backwards_may_go_on() {
     motor.until(Phase::Stopping, forwards);
 }
 
-/// Like a start after a fault in flight: with four times `STA_RAMP_A`, 4 A.
+/// The ramp begins at the rotor's speed, with the quick attempt's current: four times `STA_RAMP_A`, 4 A.
 #[test]
-fn a_reversal_in_flight_begins_with_a_quick_attempt() {
-    // A flight lasts from 0.3 s of Run on, and on the bench there is none.
-    for (policy, run_s, start_a) in [(1.0, 0.35, 16.0), (1.0, 0.25, 4.0), (0.0, 0.35, 4.0)] {
-        let changes = [(ParamId::Inp3d, 1.0), (ParamId::LimPolicy, policy)];
-        let mut motor = Coasting::new(&changes, 2000.0);
-        let [forwards, backwards] = [2000.0, -2000.0].map(|rpm| speed(&motor.bench, rpm));
-        motor.until(Phase::Run, forwards);
-        for _ in 0..motor.bench.periods(run_s) {
-            motor.step(forwards);
-        }
-        motor.until(Phase::Stopping, backwards);
-        while motor.bench.phase() == Phase::Stopping {
-            motor.rpm = (motor.rpm - 1.0).max(0.0);
-            motor.step(backwards);
-        }
-        motor.rpm = 0.0;
-        motor.until(Phase::Park, backwards);
-        let snapshot = motor.bench.state.snapshot();
-        let reference_a = motor.bench.config.scale.amperes(snapshot.i_q_reference);
-        assert!(
-            (reference_a - start_a).abs() < 0.01,
-            "{policy}, {run_s} s: {reference_a}"
-        );
+fn a_reversal_goes_through_standstill_without_waiting_for_it() {
+    let mut motor = Coasting::new(&[(ParamId::Inp3d, 1.0)], 2000.0);
+    let [forwards, backwards] = [2000.0, -2000.0].map(|rpm| speed(&motor.bench, rpm));
+    motor.until(Phase::Run, forwards);
+    motor.until(Phase::Stopping, backwards);
+    while motor.bench.phase() == Phase::Stopping {
+        motor.rpm = (motor.rpm - 1.0).max(0.0);
+        motor.step(backwards);
     }
+    assert_eq!(motor.bench.phase(), Phase::Park);
+    assert!(motor.bench.state.shared.reversed);
+    motor.until(Phase::Ramp, backwards);
+    // Below `CTL_RPM_MIN`, and still forwards.
+    assert!(
+        (150.0..300.0).contains(&motor.seen_rpm()),
+        "{}",
+        motor.seen_rpm()
+    );
+    let snapshot = motor.bench.state.snapshot();
+    let reference_a = motor.bench.config.scale.amperes(snapshot.i_q_reference);
+    assert!((reference_a - 16.0).abs() < 0.01, "{reference_a}");
 }
 
 #[test]
