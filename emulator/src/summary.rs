@@ -163,7 +163,8 @@ impl Summary {
         if !snapshot.faults.is_empty() {
             snapshot.faults.iter().for_each(|f| self.faults.insert(f));
         }
-        let started = snapshot.phase == Phase::Park && self.phase != Phase::Park;
+        let starts = |phase| matches!(phase, Phase::Park | Phase::Ramp);
+        let started = starts(snapshot.phase) && !starts(self.phase);
         self.phase = snapshot.phase;
         let drift_pct = self.drift_pct(rig.plant());
         for window in &mut self.windows {

@@ -81,7 +81,7 @@ pub struct Figures {
     /// Time from the start after which the shaft stayed within 1 % of the last commanded speed, s; `None` if it did not
     /// at the end.
     pub settled_s: Option<f64>,
-    /// Number of starts that the drive began (Park).
+    /// Number of starts that the drive began (Park, or with six-step Ramp).
     pub starts: Option<u64>,
     /// Whether the angle error reached 90°.
     pub lock_lost: Option<bool>,

@@ -242,7 +242,7 @@ fn energised(
             return Bridge::Brake;
         }
         (Phase::Tone, _) => return tone_or_test(config, state, currents, setpoint),
-        (Phase::Park | Phase::Ramp | Phase::Run | Phase::Stopping, Some(six_step)) => {
+        (Phase::Ramp | Phase::Run | Phase::Stopping, Some(six_step)) => {
             let position = six_step::given::position(config, &state.foc.observer, shared);
             let drive = (&mut state.six_step, shared);
             let input = (sample, setpoint);

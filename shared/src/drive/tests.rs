@@ -96,6 +96,14 @@ impl Bench {
         panic!("no {phase:?}, but {:?}", self.phase());
     }
 
+    /// Returns the phase in which a drive begins from rest.
+    fn beginning(&self) -> Phase {
+        match self.config.six_step {
+            Some(_) => Phase::Ramp,
+            None => Phase::Park,
+        }
+    }
+
     fn periods(&self, seconds: f32) -> u32 {
         (seconds / self.config.scale.period_s) as u32
     }

@@ -23,6 +23,8 @@ pub(super) enum Why {
     TooFast,
     /// The drivers are charged and the rotor stands at an unknown angle: align it.
     Stands,
+    /// The drivers are charged, and the six-step drive seeks the rotor by turning it.
+    Seeks,
     /// The drivers are charged and the rotor is known, by a flying start or position sensors.
     Caught,
     /// The drivers are charged and the rotor turns the other way.
@@ -56,6 +58,7 @@ pub(super) const fn next(from: Phase, why: Why, stop: Stop) -> Option<Phase> {
         (Idle | Tone, Why::Shorted) => Brake,
         (Charge, Why::ToneReady) => Tone,
         (Charge, Why::Stands) | (Charge | Stopping | Brake, Why::Followed) => Park,
+        (Charge, Why::Seeks) => Ramp,
         (Charge, Why::Caught) => Run,
         (Charge, Why::CaughtBackwards) => Stopping,
         (Park, Why::Aligned) => Ramp,
@@ -78,7 +81,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    const ALL: [Why; 18] = [
+    const ALL: [Why; 19] = [
         Why::Drive,
         Why::Tone,
         Why::Released,
@@ -87,6 +90,7 @@ mod tests {
         Why::Sensed,
         Why::TooFast,
         Why::Stands,
+        Why::Seeks,
         Why::Caught,
         Why::CaughtBackwards,
         Why::ToneReady,

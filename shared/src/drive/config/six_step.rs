@@ -1,7 +1,5 @@
 //! Coefficients of the six-step drive.
 
-use fixed::types::I36F28;
-
 use crate::control::delay::Delay;
 use crate::control::planner;
 use crate::control::six_step::{crossing, duty};
@@ -10,6 +8,9 @@ use crate::units::{AdcCounts, Current, Speed, Voltage};
 
 /// Consecutive sextants without a crossing after which the rotor is lost: two turns.
 pub(crate) const LOST_SEXTANTS: u8 = 12;
+
+/// Patience with a rotor whose back-EMF has been seen: on its way to the crossing, or swinging back from a wrong one.
+pub(crate) const PATIENCE_SEEN: u16 = 16;
 
 /// Coefficients of the six-step drive.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,18 +28,14 @@ pub struct Config {
     /// Largest current against the rotation. While braking, a released phase's back-EMF sustains
     /// its current, and a large one would hide every crossing.
     pub braking: Current,
-    /// Current in Park and Ramp.
+    /// Current in Ramp.
     pub start_current: Current,
     /// Largest current of a motor test.
     pub test_current: Current,
-    /// Current times periods for which Park holds its first angle; it holds the second twice as
-    /// long.
-    pub park_charge: I36F28,
-    /// From current to the change of Ramp's speed per period.
-    pub ramp: Gain<Current, Speed>,
-    /// Samples for which Ramp waits for a crossing.
+    /// Samples for which Ramp waits where it has seen no back-EMF; where it has, [`PATIENCE_SEEN`] times as long.
     pub patience: u16,
-    /// Periods after which a Ramp without a full turn of consecutive crossings has failed.
+    /// Periods after which a start's first Ramp without a full turn of consecutive crossings has failed; each further
+    /// one has twice the time.
     pub astray: u16,
     /// Speed at which Run may begin.
     pub run_speed: Speed,

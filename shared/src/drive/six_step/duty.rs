@@ -77,6 +77,12 @@ fn opened(
     Bounds { min, ..bounds }
 }
 
+/// Returns the greatest current whose ripple stays within the bound.
+pub(super) fn most(s: &State, shared: &Shared) -> Current {
+    let most = shared.protection.bounds.max;
+    most.minus(s.duty.ripple()).max(most / 2)
+}
+
 /// Computes the duty in Run and Stopping.
 pub(super) fn run(six_step: &Config, s: &mut State, i: Current) {
     let range = duty::range(&six_step.duty, &mut s.duty, i, s.bounds);
@@ -94,7 +100,7 @@ pub(super) fn plan(
     let bounds = shared.protection.bounds;
     let bounds = Bounds {
         min: bounds.min.max(-six_step.braking),
-        max: bounds.max.minus(s.duty.ripple()).max(bounds.max / 2),
+        max: most(s, shared),
     };
     let speed = s.tracking.omega_bar;
     let demand = demand(setpoint, shared.reversed);
@@ -166,12 +172,11 @@ pub(super) fn take_over(s: &mut State, bounds: Bounds) {
 }
 
 /// Returns the bridge in the present sextant.
-#[inline(never)] // two callers
-pub(super) fn bridge(s: &State, swapped: bool, floating: Option<Duty>) -> Bridge {
+pub(super) fn bridge(s: &State, swapped: bool) -> Bridge {
     let phases = s.sector.phases(Legs {
         switching: Some(s.duty.for_bridge()),
         low: Some(Duty::ZERO),
-        floating,
+        floating: None,
     });
     Bridge::Legs(in_order(swapped, phases))
 }

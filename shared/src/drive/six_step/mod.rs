@@ -1,10 +1,10 @@
 //! The six-step drive: from the sample to the bridge by zero crossings.
 //!
-//! It has the phases of the field-oriented drive. Park holds the rotor along one phase and then
-//! along another, so that a rotor opposite to the first does not stay there. Ramp begins with the
-//! rotor at rest there, or at the forward end of its swing. While the rotor cannot be seen, Ramp
-//! commutates at a speed that grows by `STA_RAMP_RPM_S`; crossings correct it as soon as they
-//! appear. Run begins after a full turn of consecutive crossings at `STA_RUN_RPM`.
+//! It has the phases of the field-oriented drive except Park. Ramp drives a current through two phases wherever the
+//! rotor stands, and takes the next two at each crossing, or when there has been none for a while. From half of all
+//! angles the rotor turns forwards and crosses; from the others it swings back, by less than half a turn, and as it
+//! turns round the back-EMF changes its sign, which is taken for a crossing and is as good as one. Run begins after a full
+//! turn of consecutive crossings at `STA_RUN_RPM`.
 //!
 //! Files, each after those it uses: `state`, `duty`, `telemetry`, `outer`, `given`, `start`, `period`.
 

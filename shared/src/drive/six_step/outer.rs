@@ -43,7 +43,7 @@ fn mode_change(
     match phase {
         Phase::Stopping if !is_to_stop => Some(Why::Resumed),
         Phase::Run if is_to_stop => Some(Why::Released),
-        Phase::Park | Phase::Ramp if !shared.is_along(config, setpoint) => {
+        Phase::Ramp if !shared.is_along(config, setpoint) => {
             shared.failed_starts = 0;
             Some(Why::Released)
         }

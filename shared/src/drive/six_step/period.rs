@@ -6,9 +6,8 @@ use super::state::State;
 use super::{given, outer, start, telemetry};
 use crate::control::six_step::commutation::{HALF_SEXTANT, SEXTANT};
 use crate::control::six_step::crossing;
-use crate::control::six_step::tracking::KNOWN;
 use crate::drive::config;
-use crate::drive::config::six_step::{Config, LOST_SEXTANTS};
+use crate::drive::config::six_step::{Config, LOST_SEXTANTS, PATIENCE_SEEN};
 use crate::drive::io::{Bridge, Rotation, Sample, Setpoint, in_order};
 use crate::drive::phase::Phase;
 use crate::drive::seen::reading;
@@ -16,10 +15,6 @@ use crate::drive::shared::Shared;
 use crate::drive::transitions::Why;
 use crate::protection::Fault;
 use crate::units::{AdcCounts, Speed};
-
-/// Weight, in missed sextants, of a crossing for which Ramp waited in vain: three of them end the
-/// start.
-const IMPATIENCE: u8 = 4;
 
 /// Consecutive periods without current after which the shaft counts as standing.
 const STILL_PERIODS: u16 = 1000;
@@ -55,7 +50,7 @@ pub(in crate::drive) fn begin(
             given::begin(config, six_step, (s, shared), position);
             Why::Caught
         }
-        None => Why::Stands,
+        None => Why::Seeks,
     }
 }
 
@@ -79,7 +74,7 @@ pub(in crate::drive) fn watch(
     }
 }
 
-/// Runs a period of Park, Ramp, Run or Stopping.
+/// Runs a period of Ramp, Run or Stopping.
 // Not inlined among the other modes: it needs many more registers.
 #[inline(never)]
 pub(in crate::drive) fn period(
@@ -91,9 +86,6 @@ pub(in crate::drive) fn period(
     currents: [AdcCounts; 3],
 ) -> (Bridge, Option<Why>) {
     s.next();
-    if phase == Phase::Park {
-        return start::park(config, six_step, (s, shared), currents, setpoint);
-    }
     let swapped = shared.swapped(config);
     let currents = in_order(swapped, currents);
     let terminals = in_order(swapped, sample.terminals);
@@ -115,10 +107,9 @@ pub(in crate::drive) fn period(
 
     let (mut shown, mut why) = (phase, None);
     if ramping {
-        let ramp_current = start::current(six_step, shared, setpoint);
+        let ramp_current = start::current(six_step, (s, shared), setpoint);
         hold(six_step, s, i, ramp_current);
-        if s.tracking.crossings >= KNOWN && s.tracking.omega_bar >= six_step.run_speed {
-            s.tracking.acceleration = Speed::ZERO;
+        if s.tracking.is_known() && s.tracking.omega_bar >= six_step.run_speed {
             take_over(s, shared.protection.bounds);
             (shown, why) = (Phase::Run, Some(Why::HandedOver));
         }
@@ -134,7 +125,7 @@ pub(in crate::drive) fn period(
     if why.is_none() {
         why = outer::run(config, six_step, (s, shared), setpoint, (currents, i));
     }
-    (bridge(s, swapped, None), why)
+    (bridge(s, swapped), why)
 }
 
 /// Returns how the rotor ends Run or Stopping.
@@ -177,11 +168,12 @@ fn crossings(
     let terminal = s.sector.legs(terminals).floating;
     let terminal = six_step.terminal.held(terminal);
     let rising = s.sector.rising();
+    let seeking = ramping && !s.tracking.is_known();
     let found = crossing::look(
         &six_step.crossing,
         &mut s.crossing,
         rising,
-        ramping,
+        seeking,
         s.tracking.certain(),
         terminal,
         shared.protection.bus,
@@ -192,39 +184,47 @@ fn crossings(
         s.missed = 0;
     }
     commutate(six_step, s, ramping);
-    s.astray = if ramping && s.tracking.crossings < KNOWN {
+    s.astray = if seeking {
         s.astray.saturating_add(1)
     } else {
         0
     };
-    s.missed < LOST_SEXTANTS && s.astray < six_step.astray
+    let patience = u32::from(six_step.astray) << shared.failed_starts;
+    s.missed < LOST_SEXTANTS && u32::from(s.astray) < patience
 }
 
 /// Commutates if due.
+///
+/// Until Ramp knows the rotor, a crossing ends its sextant at once. The rotor is then a quarter turn behind the current, or
+/// it has just swung to its backward end, and in the next sextant is pulled forwards from either; when it will be half a
+/// sextant further, nobody knows. A sextant without a crossing ends by its time.
 fn commutate(six_step: &Config, s: &mut State, ramping: bool) {
+    let found = s.crossing.found;
     let blind = s.crossing.blind();
-    let mut sextants = 1;
-    let due = if s.crossing.found || blind {
+    let seeking = ramping && !s.tracking.is_known();
+    let patience = six_step.patience * if blind { 1 } else { PATIENCE_SEEN };
+    let is_over = s.crossing.samples >= patience;
+    let due = if seeking {
+        found || is_over
+    } else if found || blind {
         // If nothing was seen, the released phase's current hid the crossing, or the rotor was
         // already past it: the estimate tells when the sextant ends.
         s.tracking.reaches(HALF_SEXTANT, six_step.delay)
     } else if ramping {
-        // The rotor is certainly on its way, pulled forwards, unless something holds it.
-        sextants = IMPATIENCE;
-        s.crossing.samples >= six_step.patience
+        is_over
     } else {
         s.tracking.reaches(SEXTANT, six_step.delay)
     };
     if !due {
         return;
     }
-    if s.crossing.found || (blind && s.tracking.crossings > 0) {
+    if found || (blind && !seeking && s.tracking.crossings > 0) {
         s.tracking.commutated();
     } else {
         s.tracking.forced();
     }
-    if !s.crossing.found {
-        s.missed += sextants;
+    if !found && !seeking {
+        s.missed += 1;
     }
     s.is_busy = true;
     s.sector = s.sector.next();

@@ -1,6 +1,6 @@
 //! State of the six-step drive.
 
-use fixed::types::{I1F31, I36F28};
+use fixed::types::I1F31;
 
 use crate::control::PERIODS;
 use crate::control::planner;
@@ -8,7 +8,6 @@ use crate::control::six_step::commutation::Sector;
 use crate::control::six_step::{crossing, duty, tracking};
 use crate::control::speed::Bounds;
 use crate::trace::traced;
-use crate::units::Current;
 
 /// The pieces of the outer loop. In [`PERIODS`] each falls due once, in every second period; it waits for the end of what a
 /// crossing, a commutation or a piece before it takes.
@@ -28,8 +27,9 @@ impl Piece {
     const ALL: [Self; PERIODS as usize / 2] = [Self::Demand, Self::Seen, Self::Supply, Self::Mode];
 }
 
-/// Park first holds the rotor along phase c, at 240°.
-pub(super) const FIRST_PARK: Sector = Sector::Cb;
+/// The first sextant of a start. Its phase rises: a rotor at rest looks like one before its crossing, and not like one past
+/// it.
+pub(super) const FIRST: Sector = Sector::Ba;
 
 traced! {
     /// State of the six-step drive.
@@ -49,12 +49,6 @@ traced! {
         pub(super) due: u8,
         /// In this period a crossing was found, a sextant ended, or a piece was run.
         pub(super) is_busy: bool,
-        /// ∫i dt at the present angle of Park.
-        pub(super) charge: I36F28,
-        /// Current induced by the rotor's swing in Park, smoothed; positive forwards.
-        pub(super) swing: Current,
-        /// The rotor certainly swings forwards.
-        pub(super) swings_forwards: bool,
         /// Periods since Ramp last tracked the rotor.
         pub(super) astray: u16,
         /// Consecutive periods without current while the low sides are on.
@@ -69,18 +63,15 @@ traced! {
 impl Default for State {
     fn default() -> Self {
         Self {
-            sector: FIRST_PARK,
+            sector: FIRST,
             crossing: crossing::State::default(),
-            tracking: tracking::State::default(),
+            tracking: tracking::State::at_rest(),
             duty: duty::State::default(),
             wanted: I1F31::ZERO,
             bounds: Bounds::default(),
             slot: 0,
             due: 0,
             is_busy: false,
-            charge: I36F28::ZERO,
-            swing: Current::ZERO,
-            swings_forwards: false,
             astray: 0,
             still: 0,
             missed: 0,

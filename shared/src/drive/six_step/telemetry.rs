@@ -4,14 +4,13 @@ use fixed::types::I1F31;
 
 use super::state::State;
 use crate::control::PERIODS;
-use crate::control::six_step::commutation::SEXTANT;
 use crate::control::transform::{Dq, clarke, park};
 use crate::drive::config::Config;
 use crate::drive::phase::Phase;
 use crate::drive::shared::Shared;
 use crate::math::{SinCos, TopProduct};
 use crate::protection;
-use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
+use crate::units::{AdcCounts, Angle, Current, Voltage};
 
 /// 1/√3 with 31 fraction bits.
 const RECIPROCAL_ROOT_3: I1F31 = I1F31::from_bits(1_239_850_263);
@@ -25,17 +24,15 @@ pub(super) fn update(
 ) {
     let seen = &mut shared.seen;
     seen.phase = phase;
-    let parked = phase == Phase::Park;
-    let (angle, _) = angles(s, phase);
-    seen.speed = match (parked, s.tracking.crossings) {
-        (true, _) => Speed::ZERO,
-        (false, 0) => s.tracking.omega,
-        (false, _) => s.tracking.omega_bar,
+    seen.speed = match s.tracking.crossings {
+        0 => s.tracking.omega,
+        _ => s.tracking.omega_bar,
     };
     if s.tracking.crossings > 0 && s.crossing.samples == 0 && s.missed == 0 {
         // The released phase's current died in the sextant that just ended, or no crossing would have been found.
         shared.shown = currents;
     }
+    let angle = angle(s);
     shared.seen.angle = if shared.swapped(config) {
         angle.wrapping_neg()
     } else {
@@ -43,22 +40,15 @@ pub(super) fn update(
     };
 }
 
-/// Returns the rotor's angle, and that past mid-sextant.
-fn angles(s: &State, phase: Phase) -> (Angle, Angle) {
-    // In Park the rotor is assumed to stand along the switching phase.
-    let delta = if phase == Phase::Park {
-        SEXTANT
-    } else {
-        s.tracking.delta
-    };
-    (s.sector.middle().wrapping_add(delta), delta)
+/// Returns the rotor's angle.
+fn angle(s: &State) -> Angle {
+    s.sector.middle().wrapping_add(s.tracking.delta)
 }
 
 /// Updates the currents and voltages.
 pub(super) fn see(s: &State, shared: &mut Shared, (currents, i): ([AdcCounts; 3], Current)) {
-    let (angle, delta) = angles(s, shared.seen.phase);
     let duty = s.duty.duty;
-    let from_middle = SinCos::of(delta);
+    let from_middle = SinCos::of(s.tracking.delta);
     let switched: Voltage = duty.top(shared.protection.bus).scaled();
     let along: Voltage = switched.top(RECIPROCAL_ROOT_3).scaled();
     let seen = &mut shared.seen;
@@ -66,7 +56,7 @@ pub(super) fn see(s: &State, shared: &mut Shared, (currents, i): ([AdcCounts; 3]
         d: along.top(from_middle.sin).scaled(),
         q: along.top(from_middle.cos).scaled(),
     };
-    seen.i = park(clarke(currents), SinCos::of(angle));
+    seen.i = park(clarke(currents), SinCos::of(angle(s)));
     seen.bus_current = duty.top(i).scaled();
 }
 

@@ -109,7 +109,9 @@ fn no_sample_and_no_set_point_makes_any_drive_overflow() {
                 for phase in [Phase::Idle, Phase::Sense, Phase::Charge] {
                     assert!(seen.contains(&phase), "{changes:?}: {seen:?}");
                 }
-                let drives = if observer == 2.0 && drive == 0.0 {
+                let drives = if drive == 1.0 {
+                    Phase::Ramp
+                } else if observer == 2.0 {
                     Phase::Run
                 } else {
                     Phase::Park

@@ -24,7 +24,7 @@ fn asked(bench: &Bench, phase: Phase) -> Setpoint {
 fn within(drive: &[(ParamId, f32)], phase: Phase) -> Bench {
     let mut bench = Bench::new(drive);
     let turn = bench.turn();
-    bench.until(Phase::Park, turn);
+    bench.until(bench.beginning(), turn);
     bench.state.phase = phase;
     if let Some(six_step) = &bench.config.six_step {
         // One that stands still in Run has failed to start.

@@ -151,7 +151,7 @@ fn a_start_the_other_way_begins_with_the_first_attempt() {
         let drives = [(ParamId::CtlDrive, drive), (ParamId::CtlRpmMax, 4500.0)];
         let mut bench = Bench::new(&[&drives[..], &[(ParamId::Inp3d, 1.0)]].concat());
         let turn = bench.turn();
-        bench.until(Phase::Park, turn);
+        bench.until(bench.beginning(), turn);
         bench.state.shared.failed_starts = 1;
         bench.quiet(CYCLE, turn);
         assert_eq!(bench.state.shared.failed_starts, 1);
