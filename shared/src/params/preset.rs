@@ -1,7 +1,7 @@
 //! Named sets of parameters.
 
 use super::ParamId;
-use super::choice::{CtlObsCure, CtlObserver, CtlRegulator, CtlSpeed};
+use super::choice::{CtlObsCure, CtlObserver, CtlRegulator, CtlSpeed, StaMode};
 
 /// A named set of parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +54,7 @@ pub const BOSSO_TABLE_III: Preset = Preset {
         (ParamId::StaRampA, 4.0),
         (ParamId::StaRampRpmS, 800.0),
         (ParamId::StaRunRpm, 300.0),
+        StaMode::Stated.setting(),
     ],
 };
 
@@ -76,6 +77,7 @@ pub const BOSSO_BENCH: Preset = Preset {
         (ParamId::StaRampA, 4.0),
         (ParamId::StaRampRpmS, 800.0),
         (ParamId::StaRunRpm, 300.0),
+        StaMode::Stated.setting(),
     ],
 };
 

@@ -434,6 +434,10 @@ parameters! {
         "Acceleration of the ramp at full ramp current; 0 follows from the motor";
     73 StaRunRpm "STA_RUN_RPM" "rpm" FromMotor 50.0..50000.0 = 0.0
         "Mechanical speed at which the observer takes over from the ramp; 0 follows from the motor";
+    74 StaMode "STA_MODE" "" Whole 0.0..1.0 = 0.0
+        "First attempt of a field-oriented start" one of
+            0 AtOnce "at once: four times STA_RAMP_A, alignment and ramp as short as its torque allows"
+            1 Stated "as stated: STA_PARK_AS, STA_RAMP_A and STA_RAMP_RPM_S";
     80 TelRateHz "TEL_RATE_HZ" "Hz" Real 1.0..100.0 = 10.0 live
         "Rate of ESC_STATUS and ESC_TELEMETRY_1_TO_4";
     81 TelBaud "TEL_BAUD" "bit/s" Whole 115200.0..921600.0 = 115200.0 restart

@@ -3,6 +3,7 @@
 use super::*;
 use crate::control::sensing::Shunts;
 use crate::params::BOSSO_MOTOR;
+use crate::params::choice::StaMode;
 
 /// Readings of phase c, which has no sensor.
 const NONSENSE_A: [f64; 4] = [0.0, 39.0, -39.0, 7.3];
@@ -12,7 +13,10 @@ fn with_two_shunts() -> Bench {
         shunts: Shunts::Two,
         ..Board::BENCH
     };
-    let config = build(&Params::of(&BOSSO_MOTOR), &board).expect("it makes a drive");
+    let mut params = Params::of(&BOSSO_MOTOR);
+    let (stated, value) = StaMode::Stated.setting();
+    params.set(stated, value).expect("in range");
+    let config = build(&params, &board).expect("it makes a drive");
     let state = State::new(&config);
     Bench { config, state }
 }

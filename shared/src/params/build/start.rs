@@ -7,6 +7,7 @@ use crate::control::start;
 use crate::drive::ATTEMPTS;
 use crate::math::{Real, square_root};
 use crate::params::ParamId;
+use crate::params::choice::StaMode;
 use crate::units::{Charge, INVERSE_FLUX_NOMINAL, Voltage};
 
 /// Damping ζ of the rotor's swing about the current vector in Park and Ramp.
@@ -21,19 +22,23 @@ const YIELD_RATE_MAX: f32 = 0.5;
 /// Share of its current's torque that the ramp uses; the rest is for the load and a swinging rotor.
 const TORQUE_SHARE: f32 = 0.3;
 
-/// The quick attempt, then those of a start: current over `STA_RAMP_A`, half more each time; the inertia that the attempt
-/// assumes over the stated one; and how much shorter Park and steeper Ramp are than stated, where the rotor follows.
-const COURSES: [[f32; 3]; 1 + ATTEMPTS] = [
-    [4.0, 1.0, 6.0],
-    [1.0, 1.0, 1.0],
-    [1.5, 10.0, 1.0],
-    [2.25, 20.0, 1.0],
-    [3.375, 40.0, 1.0],
+/// The course of an attempt: current over `STA_RAMP_A`; the inertia that it assumes over the stated one; how much shorter
+/// Park and steeper Ramp are than stated, where the rotor follows; and the least length of Park in periods of the rotor's
+/// swing. The first half of Park sweeps, and in the second a swing damped by ζ = 0.5 decays: of three periods to 3 %, of
+/// two to 10 %.
+type Course = [f32; 4];
+
+/// The quick attempt, then those of a start, with half more current each time.
+const COURSES: [Course; 1 + ATTEMPTS] = [
+    [4.0, 1.0, 6.0, 3.0],
+    [1.0, 1.0, 1.0, 3.0],
+    [1.5, 10.0, 1.0, 3.0],
+    [2.25, 20.0, 1.0, 3.0],
+    [3.375, 40.0, 1.0, 3.0],
 ];
 
-/// Least length of Park in periods of the rotor's swing: the first half sweeps, and in the second a swing damped by ζ =
-/// 0.5 decays to 3 %.
-const PARK_SWINGS: f32 = 3.0;
+/// The first attempt of a start, unless `STA_MODE` has it as stated: in the time that the torque of most of the limit takes.
+const AT_ONCE: Course = [4.0, 1.0, 12.0, 2.0];
 
 /// Time for which a rotor may turn too slowly in Ramp, in periods of its swing.
 const ASTRAY_SWINGS: f32 = 1.0;
@@ -41,11 +46,14 @@ const ASTRAY_SWINGS: f32 = 1.0;
 /// Supply over the voltage of its longest vector: 1.75 to 2.2, by modulation and largest duty.
 const SUPPLY: f32 = 2.0;
 
-/// Fills in the attempts of a start (section 3.2 of the second paper): each has more current, up to `LIM_PHASE_A`, and
-/// is slower than the one before.
+/// Fills in the attempts of a start (section 3.2 of the second paper): each has more current than the one before, up to
+/// `LIM_PHASE_A`, and is slower; but the first may be [`AT_ONCE`].
 pub(super) fn attempts(p: &Si, places: &mut [start::Config; 1 + ATTEMPTS]) {
     for (place, course) in places.iter_mut().zip(&COURSES) {
         attempt(p, course, place);
+    }
+    if p.chosen(StaMode::AtOnce) {
+        attempt(p, &AT_ONCE, &mut places[1]);
     }
 }
 
@@ -57,7 +65,7 @@ pub(super) fn bus(p: &Si) -> Voltage {
     p.voltage(volts * SUPPLY)
 }
 
-fn attempt(p: &Si, [current, inertia, haste]: &[f32; 3], place: &mut start::Config) {
+fn attempt(p: &Si, [current, inertia, haste, swings]: &Course, place: &mut start::Config) {
     let settings = &p.settings;
     let current_a = (current * settings.ramp_a).min(p.limit_a);
     let inertia = inertia * p.j;
@@ -70,7 +78,7 @@ fn attempt(p: &Si, [current, inertia, haste]: &[f32; 3], place: &mut start::Conf
     // damps it by ζ.
     let swing_rad_s = square_root(p.pole_pairs * torque_nm / inertia);
     let yield_rate = (YIELD_RATE_SHARE * swing_rad_s * p.t).min(YIELD_RATE_MAX);
-    let swing_as = PARK_SWINGS * TAU / swing_rad_s * current_a;
+    let swing_as = swings * TAU / swing_rad_s * current_a;
     let park_charge = (settings.park_as / haste).max(swing_as) / p.unit_as;
     place.current = p.scale.current_from_a(current_a);
     place.yielding = p.gain(ParamId::MotJGcm2, 2.0 * SWING_DAMPING / swing_rad_s / p.t);
@@ -164,6 +172,22 @@ mod tests {
         for (got, wanted) in quick.into_iter().zip([16.0, 4800.0, 3.0 * swing_s]) {
             assert!((got / wanted - 1.0).abs() < 0.01, "{quick:?}");
         }
+    }
+
+    #[test]
+    fn a_start_at_once_takes_the_time_of_most_of_the_limit_s_torque_and_then_goes_on_as_stated() {
+        let stated = courses(&[]);
+        let at_once = courses(&[StaMode::AtOnce.setting()]);
+        let most = possible(16.0, 1.0);
+        let wanted = [
+            16.0,
+            (0.3 * most / 12.0 * 60.0 / TAU).min(9600.0),
+            2.0 * TAU / square_root(most),
+        ];
+        for (got, wanted) in at_once[1].into_iter().zip(wanted) {
+            assert!((got / wanted - 1.0).abs() < 0.01, "{at_once:?}: {wanted}");
+        }
+        assert_eq!((&at_once[0], &at_once[2..]), (&stated[0], &stated[2..]));
     }
 
     #[test]
