@@ -372,12 +372,12 @@ pub fn duties(
     [duty(common, a), duty(common, b), duty(common, c)]
 }
 
-/// Returns the three duties of a vector, without compensation of the dead time: at standstill.
+/// Returns the three duties of a vector that makes every phase switch, without compensation of the dead time: at
+/// standstill.
 #[inline(always)] // as a call it costs 48 bytes more on the chip
 pub fn uncompensated(config: &Config, supply: &Supply, v: AlphaBeta<TurnedVoltage>) -> [Duty; 3] {
     let (order, none) = (PhaseOrder::NORMAL, &dead_time::Config::NONE);
-    let most = whole_duty(config.duty_max);
-    duties(config, supply, v, order, none, AlphaBeta::default()).map(|duty| duty.min(most))
+    duties(config, supply, v, order, none, AlphaBeta::default())
 }
 
 /// Returns a phase's duty, which is below 1.
@@ -388,7 +388,7 @@ fn duty(common: I1F31, share: Share) -> Duty {
 
 /// Returns a share that is not negative as a duty.
 #[inline(always)] // in each period
-pub(super) fn whole_duty(share: I1F31) -> Duty {
+pub fn whole_duty(share: I1F31) -> Duty {
     Duty::from_bits(share.to_bits() as u32)
 }
 

@@ -130,7 +130,8 @@ pub(super) fn period(
     let turned = modulator::uncompensated(&config.modulator, &shared.supply, v);
     let mut duties = [Duty::ZERO; 3];
     for (behind, duty) in turned.into_iter().enumerate() {
-        duties[at(behind)] = duty;
+        // The shortest periods leave less than half of the supply and the ripple take.
+        duties[at(behind)] = duty.min(modulator::whole_duty(config.modulator.duty_max));
     }
     shared.applied.expect_unreadable();
     shared.applied.command(duties);
