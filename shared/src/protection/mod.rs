@@ -38,8 +38,10 @@ pub struct Config {
     pub phase: Current,
     /// Bound on the current from the supply, `LIM_BUS_A`.
     pub bus_draw: Current,
-    /// Supply voltage at which nothing more is drawn.
+    /// Supply voltage below which less is drawn.
     pub bus_draw_v: Voltage,
+    /// Supply voltage at which nothing more is drawn.
+    pub bus_empty_v: Voltage,
     /// From volts above that to the current that may be drawn.
     pub bus_draw_slope: Gain<Voltage, Current>,
     /// Bound on the current into the supply, `LIM_REGEN_A`.
@@ -188,12 +190,12 @@ pub fn bound(
 ) {
     let ahead = state.bus.plus(state.rise.saturating_mul_int(AHEAD_PERIODS));
     let may_return = may_return(config, ahead);
+    let too_much_drawn = if ahead.min(state.bus) >= config.bus_draw_v {
+        bus_current.minus(config.bus_draw)
+    } else {
+        too_much_for_sag(config, state, ahead, (bus_current, i_q))
+    };
     let bounds = &mut state.bounds;
-    if bus_current > may_draw(config, ahead) {
-        bounds.max = bounds.max.min(i_q.max(Current::ZERO));
-    }
-    let too_much_for_sag = bus_current.minus(may_draw(config, state.bus)) >> SAG_SHIFT;
-    let too_much_drawn = bus_current.minus(config.bus_draw).max(too_much_for_sag);
     if too_much_drawn.is_positive() || bounds.max != config.phase {
         let lowered = bounds.max.minus(change(config, too_much_drawn, periods));
         bounds.max = lowered.min(config.phase).max(Current::ZERO);
@@ -218,6 +220,24 @@ pub fn bound(
     bounds.min = raised.max(-config.phase).min(Current::ZERO);
 }
 
+/// Bounds the current of a supply that sags to the present one, if it is too much for the voltage `ahead`; returns by how
+/// much the drawn current is too much for the present voltage, as far as the bound is to follow it.
+#[cold]
+#[inline(never)] // rare, so not part of the longest period
+fn too_much_for_sag(
+    config: &Config,
+    state: &mut State,
+    ahead: Voltage,
+    (bus_current, i_q): (Current, Current),
+) -> Current {
+    let bounds = &mut state.bounds;
+    if bus_current > may_draw(config, ahead) {
+        bounds.max = bounds.max.min(i_q.max(Current::ZERO));
+    }
+    let too_much = bus_current.minus(may_draw(config, state.bus)) >> SAG_SHIFT;
+    too_much.max(bus_current.minus(config.bus_draw))
+}
+
 /// Returns the change of a bound in `periods` for a bus current that exceeds its own bound by this.
 fn change(config: &Config, excess: Current, periods: u32) -> Current {
     let change: Current = config.bound_rate.of(excess);
@@ -227,7 +247,7 @@ fn change(config: &Config, excess: Current, periods: u32) -> Current {
 /// Returns the current that the supply may deliver at this voltage; negative near the lower limit.
 #[inline(never)] // two callers
 fn may_draw(config: &Config, bus: Voltage) -> Current {
-    config.bus_draw_slope.held(bus.minus(config.bus_draw_v))
+    config.bus_draw_slope.held(bus.minus(config.bus_empty_v))
 }
 
 /// Returns the current that the supply may sink at its extrapolated voltage; negative beyond the limit.

@@ -386,7 +386,9 @@ fn limits(p: &Si, place: &mut protection::Config) {
     place.bus_draw = current(ParamId::LimBusA);
     let draw_v = draw_v(p.params);
     let draw_a = p.get(ParamId::LimBusA).min(p.limit_a);
-    place.bus_draw_v = p.voltage(p.get(ParamId::LimBusVMin) + DRAW_NONE_SHARE * draw_v);
+    let least_v = p.get(ParamId::LimBusVMin);
+    place.bus_empty_v = p.voltage(least_v + DRAW_NONE_SHARE * draw_v);
+    place.bus_draw_v = p.voltage(least_v + (1.0 + DRAW_NONE_SHARE) * draw_v);
     place.bus_draw_slope = p.gain(ParamId::LimBusA, draw_a / draw_v * p.unit_v / p.unit_a);
     place.bus_return = current(ParamId::LimRegenA);
     place.bus_return_v = p.voltage(p.supply_max_v - RETURN_BAND_V);
