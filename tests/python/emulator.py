@@ -24,7 +24,7 @@ SETTINGS = (
 ).split()
 """What else the default bench sets, and the factory leaves at 0: from the motor."""
 
-OF_BENCH = (*MOTOR, *SETTINGS)
+OF_BENCH = (*MOTOR, *SETTINGS, "STA_MODE")
 
 
 def free_port(kind: int = socket.SOCK_STREAM) -> int:

@@ -95,14 +95,14 @@ class Outcome:
     """Largest current from the first climb to the end of the slams, over LIM_PHASE_A."""
 
     def holds(self, least: float) -> bool:
-        return self.share >= least and not self.told and not self.lost and self.current_share < 1.4
+        return self.share >= least and not self.told and not self.lost and self.current_share < 1.2
 
 
 def plant_of(motor: dict, load: dict, params: dict, scale: dict) -> Plant:
     phase_a, bus_a = params.get("LIM_PHASE_A", 20.0), params.get("LIM_BUS_A", 30.0)
     true = {key: motor[key] * scale.get(key, 1.0) for key in ("R", "L", "flux")}
     # Beyond, the bridge off would rectify more than the supply's greatest voltage.
-    fastest = params.get("LIM_BUS_V_MAX", 36.0) / math.sqrt(3) / motor["flux"] / motor["pole_pairs"]
+    fastest = params.get("LIM_BUS_V_MAX", 30.0) / math.sqrt(3) / motor["flux"] / motor["pole_pairs"]
     friction_nm = motor.get("friction_nm", 0.0)
     return Plant(*true.values(), motor["pole_pairs"], phase_a, bus_a, fastest, load, friction_nm)
 

@@ -92,7 +92,10 @@ impl Config {
             vector_max: I1F31::from_f32(longest * duty_max),
             readable: I1F31::from_f32(readable),
             linear: I1F31::from_f32(longest * duty_max),
-            over: Overmodulation::default(),
+            over: Overmodulation {
+                vector_max: I1F31::from_f32(longest * duty_max),
+                ..Overmodulation::default()
+            },
         }
     }
 

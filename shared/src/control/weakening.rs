@@ -50,19 +50,20 @@ impl State {
 }
 
 impl Config {
-    /// Advances i_d at this speed, where the last period's voltage was `u`.
+    /// Advances i_d at this speed.
     #[inline(always)] // two comparisons, in the longest period
-    pub fn step(&self, state: &mut State, speed: Speed, u: Dq<Voltage>, longest: &VectorLimit) {
+    pub fn step(&self, state: &mut State, speed: Speed, longest: &VectorLimit) {
         if state.missing != WideVoltage::ZERO || state.i_d != Current::ZERO {
-            self.weaken(state, speed, u, longest);
+            self.weaken(state, speed, longest);
         }
     }
 
     #[cold]
-    fn weaken(&self, state: &mut State, speed: Speed, u: Dq<Voltage>, longest: &VectorLimit) {
+    fn weaken(&self, state: &mut State, speed: Speed, longest: &VectorLimit) {
         if state.missing == WideVoltage::ZERO {
-            // All of them were far from the limit; the type holds half of their sum.
-            state.missing = missing(u, None, longest) << 3;
+            // All of them were far from the limit, as after a throttle cut: there i_d only returns power to the supply.
+            state.i_d = state.i_d / 2;
+            return;
         }
         let mut change = self.rate.of(core::mem::take(&mut state.missing));
         if !is_fast(speed, longest) {
@@ -154,7 +155,7 @@ mod tests {
                     state.note(u(applied), cut, &longest());
                 }
             }
-            config.step(state, speed, u(applied), &longest());
+            config.step(state, speed, &longest());
         }
     }
 

@@ -7,7 +7,7 @@
 //!
 //! A tone and Brake have cycles of their own, in `tone.rs` and `foc/brake.rs`.
 
-use crate::control::PERIODS;
+use crate::control::{PERIODS, weakening};
 
 /// Periods until every piece has been done: four outer-loop periods.
 pub(super) const CYCLE: u32 = 4 * PERIODS;
@@ -133,6 +133,8 @@ const START: &[Row] = &[
     (Work::SPEED_PRESET, 28, CYCLE),
     (Work::HAND_OVER, 30, CYCLE),
 ];
+
+const _: () = assert!(SUPPLY_PERIODS == weakening::PERIODS);
 
 /// Both schedules, one after the other.
 const SLOTS: [Cycle; 2] = [cycle(RUN), cycle(START)];

@@ -137,7 +137,8 @@ impl Shared {
     pub(super) fn start_failed(&mut self) -> Why {
         if self.against {
             // A rotor that turns is not stuck: once what turns it is weaker, the next attempt succeeds.
-            self.failed_starts = (self.failed_starts + 1) % ATTEMPTS as u8;
+            // Another number each time, which tells of it.
+            self.failed_starts = self.failed_starts % (ATTEMPTS as u8 - 1) + 1;
             return Why::Failed;
         }
         let quick = &mut self.latch.quick_attempts;

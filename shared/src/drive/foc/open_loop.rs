@@ -22,12 +22,7 @@ const STOP_PROVEN: u32 = 4;
 /// The coefficients of the attempt that is being made. What turns the rotor the other way leaves no time for less than
 /// the quick attempt's current.
 fn attempt<'a>(config: &'a Config, shared: &Shared) -> &'a start::Config {
-    let quick = if shared.against {
-        shared.failed_starts == 0
-    } else {
-        shared.latch.quick_attempts > 0
-    };
-    let n = if quick {
+    let n = if shared.against || shared.latch.quick_attempts > 0 {
         0
     } else {
         usize::from(shared.failed_starts) + 1

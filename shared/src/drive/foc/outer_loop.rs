@@ -111,9 +111,7 @@ pub(in crate::drive) fn speed_bounds(config: &Config, foc: &mut State, shared: &
     let (speed, weakening) = (shared.seen.speed, &mut loops.weakening);
     let (i_d, bounds) = config.low_speed.bounds(bounds, speed);
     let longest = &shared.supply.longest;
-    config
-        .weakening
-        .step(weakening, speed, shared.seen.u, longest);
+    config.weakening.step(weakening, speed, longest);
     loops.i_d_reference = if weakening.i_d == Current::ZERO {
         protection::burning_i_d(&config.protection, &shared.protection, i_d)
     } else {

@@ -91,7 +91,8 @@ impl Component {
         }
         // Until the last attempt, which is a fault, nothing else says why the motor does not turn.
         let failed = context.telemetry.failed_starts;
-        if failed > core::mem::replace(&mut self.failed_starts, failed) && faults.is_empty() {
+        let before = core::mem::replace(&mut self.failed_starts, failed);
+        if failed != before && failed != 0 && faults.is_empty() {
             let text = "Start failed: retrying";
             self.text(MavSeverity::MAV_SEVERITY_WARNING, &[text], send);
         }
