@@ -127,7 +127,8 @@ pub fn stated_torque(i_q: Current) -> Torque {
 /// sensing has fractions.
 pub type AdcCounts = I16F16;
 
-/// The share of the PWM period for which the high side is on, 0 to 1.
+/// The share of the PWM period for which the high side is on, 0 to 1. A phase that stays high has `Duty::MAX`, nearly
+/// 2: it fills the period.
 pub type Duty = fixed::types::U1F31;
 
 /// The control's units in SI.

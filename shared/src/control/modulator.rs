@@ -275,8 +275,8 @@ const D_RESERVE: u32 = 4;
 const TOO_LONG: u32 = 10;
 
 /// Shortens a voltage vector to what the supply allows. Keeps the d component, which cancels what current and speed
-/// induce, up to seven eighths of the length. With all of the length in d nothing would regulate i_q, which would
-/// stay beyond its bound: ω·L·i_q is then what the d component cancels.
+/// induce, up to 15/16 of the length. With all of the length in d nothing would regulate i_q, which would stay beyond
+/// its bound: ω·L·i_q is then what the d component cancels.
 ///
 /// Returns the vector, and the part cut off if it was shortened.
 #[inline(always)] // in each period

@@ -4,8 +4,9 @@
 //! the sum of the others. So the whole supply lies between the phases. Near the hexagon's corners the second phase, too,
 //! would have less on-time than it needs: it keeps its largest duty, and there the vector is a little shorter.
 //!
-//! Beyond the hexagon the vector is cut, and the fundamental rises towards a six-step's: Holtz, "Pulsewidth modulation for
-//! electronic power conversion", Proc. IEEE 82 (1994), section IV.
+//! Beyond the hexagon the vector is cut, and the fundamental rises to 0.609 of what the highest phase has, with a
+//! vector to the hexagon's corners; a six-step's is 0.637: Holtz, "Pulsewidth modulation for electronic power
+//! conversion", Proc. IEEE 82 (1994), section IV.
 
 use fixed::types::{I1F31, I8F24};
 

@@ -1,5 +1,6 @@
-//! Voltage mode: a share of the full modulation along q, as a flight controller's throttle commands
-//! it.
+//! Voltage mode: a voltage along q, as a flight controller's throttle commands it. It is a share of the length up to
+//! which every phase switches, [`Supply::switched`](super::modulator::Supply::switched); where the flux may be
+//! weakened, the end of the throttle's range adds to it.
 //!
 //! The current regulator stays in charge, with the i_q* at which it outputs that voltage. So i_d
 //! stays at its reference, and where [`torque::follow`](super::torque::follow) bounds i_q*, the
@@ -12,13 +13,14 @@ use super::transform::Dq;
 use crate::math::{Held, TopProduct};
 use crate::units::{Current, Voltage};
 
-/// Returns the voltage for a share, −1 to 1, of the longest vector the supply allows.
+/// Returns the voltage for a share, −1 to 1, of the length up to which every phase switches.
 pub fn of_share(share: I1F31, vector_max: Voltage) -> Voltage {
     vector_max.top(share).scaled()
 }
 
-/// Share from which the voltage rises faster, so that the whole throttle ends at half more than the supply has: with
-/// the flux weakened a motor turns as if it had that. Of the benches the first paper's needs most, 1.25 times.
+/// Share from which the voltage rises faster, so that the whole throttle ends at 1.56 of the length up to which every
+/// phase switches: with the flux weakened a motor turns as if the supply had that. Of the benches the first
+/// paper's needs most, 1.25 times.
 const FASTER_FROM: I1F31 = I1F31::lit("0.8125");
 
 /// Returns what the end of the throttle's range adds to [`of_share`], with the square of the share beyond.

@@ -53,7 +53,7 @@
 //! | Park, Ramp | `foc/open_loop.rs` | imposes the frame, the rotor follows |
 //! | Run, Stopping | `foc/` | field-oriented control |
 //! | Brake | `foc/brake.rs` | the low sides are on, the observer keeps running |
-//! | Park, Ramp, Run, Stopping, Brake with `CTL_DRIVE` 1 | `six_step/` | the same by zero crossings |
+//! | Ramp, Run, Stopping, Brake with `CTL_DRIVE` 1 | `six_step/` | the same by zero crossings; Ramp seeks the rotor |
 //! | Tone | `tone.rs`, `self_test.rs`, `excite.rs` | the phases switch to be heard, tested or measured: [`Setpoint::Pull`], [`Setpoint::Excite`] |
 //!
 //! `transitions.rs` has the table of all mode changes with their reasons. One function makes them, `State::change`,
@@ -77,6 +77,8 @@
 //!   +--- Coasts (Run, Stopping), Failed (Ramp, Run, Stopping), Tripped (any)
 //!
 //!  Idle -- Shorted --> Brake
+//!
+//!  Charge -- Seeks --> Ramp: the six-step drive, which has no Park
 //!
 //!  Charge, Stopping, Brake -- Followed --> Park: a rotor that turns slowly, or slowed down the other way
 //! ```

@@ -1,8 +1,8 @@
 //! Idle and Sense: the bridge is off, and the open terminals show the rotor.
 //!
 //! A start begins with a few milliseconds in which the current offsets are measured and the rotor is searched for.
-//! A turning rotor is caught where it is, one that turns the other way is stopped first, and a standing one is
-//! parked.
+//! The field-oriented drive catches a turning rotor where it is, stops one that turns the other way first, follows a
+//! slow one, and parks a standing one. Six-step seeks the rotor by turning it.
 
 use super::config::{Config, Direction};
 use super::io::Sample;

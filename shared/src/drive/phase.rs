@@ -12,9 +12,9 @@ pub enum Phase {
     Sense,
     /// The low sides charge the supplies of the high-side drivers.
     Charge,
-    /// The rotor is being aligned.
+    /// The rotor is being aligned; field-oriented only.
     Park,
-    /// The current vector accelerates and the rotor follows.
+    /// The current vector accelerates and the rotor follows; six-step seeks the rotor by turning it.
     Ramp,
     /// The observer knows the rotor's position: field-oriented control.
     Run,

@@ -19,7 +19,7 @@ pub(super) enum Why {
     Shorted,
     /// The current offsets are measured, and the rotor is known as far as possible.
     Sensed,
-    /// The shaft turns too fast for the six-step drive, which has no flying start, to park it.
+    /// The shaft turns too fast for the six-step drive, which has no flying start, to seek it.
     TooFast,
     /// The drivers are charged and the rotor stands at an unknown angle: align it.
     Stands,

@@ -427,11 +427,11 @@ parameters! {
             0 Bench "bench: the bridge stays off until zero throttle"
             1 Flight "flight: if the fault can pass, the motor is tried again up to three times";
     70 StaParkAs "STA_PARK_AS" "A.s" FromMotor 0.01..100.0 = 0.0
-        "Current times time for which the rotor is aligned before the ramp; 0 follows from the motor";
+        "Current times time for which the rotor is aligned before a field-oriented ramp; 0 follows from the motor";
     71 StaRampA "STA_RAMP_A" "A" FromMotor 0.1..100.0 = 0.0
         "Current of alignment and ramp, peak; 0 follows from the motor";
     72 StaRampRpmS "STA_RAMP_RPM_S" "rpm/s" FromMotor 10.0..1000000.0 = 0.0
-        "Acceleration of the ramp at full ramp current; 0 follows from the motor";
+        "Acceleration of a field-oriented ramp at full ramp current; 0 follows from the motor";
     73 StaRunRpm "STA_RUN_RPM" "rpm" FromMotor 50.0..50000.0 = 0.0
         "Mechanical speed at which the observer takes over from the ramp; 0 follows from the motor";
     74 StaMode "STA_MODE" "" Whole 0.0..1.0 = 0.0

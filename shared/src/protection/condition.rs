@@ -202,7 +202,7 @@ conditions! {
     /// The motor has all the voltage that the supply can give.
     Duty = 20 "duty" None,
         "the motor gets the full supply voltage"
-        "cannot speed up";
+        "speeds up only while the flux can still be weakened (`CTL_WEAKEN`)";
     /// A phase carries no current in one direction or in both.
     PhaseOpen = 21 "phase open" Some(Raised::Warning),
         "a phase carries no current, or in one direction only: a loose wire, or a switch that does not turn on"
@@ -217,7 +217,7 @@ conditions! {
         "keeps running on the others, and without them at speed";
     /// The supply is near `LIM_BUS_V_MIN`.
     SupplySag = 24 "supply sag" Some(Raised::Alert),
-        "the supply is less than 8 % above `LIM_BUS_V_MIN`"
+        "the supply is less than 8 %, or 0.31 V if that is more, above `LIM_BUS_V_MIN`"
         "draws less: there is no more torque, and none at all just above `LIM_BUS_V_MIN`";
 }
 

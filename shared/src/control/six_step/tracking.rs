@@ -71,7 +71,7 @@ impl State {
             let half_sextant = i64::from(HALF_SEXTANT.to_bits());
             overdue = off > half_sextant;
             if off.abs() > half_sextant / 2 {
-                // It was not where it was aligned to, or the load differs.
+                // It was not where it was taken to be, or the load differs.
                 self.omega = mean;
             } else {
                 // At low speed a crossing may be seen some degrees early or late, so only half the correction is

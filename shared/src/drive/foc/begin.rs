@@ -25,7 +25,7 @@ const COMMANDED: u32 = REGULATOR + 1;
 pub(in crate::drive) const PREPARATION_PERIODS: u32 = COMMANDED + 1;
 
 /// Prepares a drive, one piece a period: this is period `n`, from 1. In the last one the rotor is caught if it turns,
-/// started from where its sensors show it, or parked.
+/// followed if it turns slowly, started from where its sensors show it, or parked.
 #[cold]
 pub(in crate::drive) fn begin(
     config: &Config,

@@ -19,7 +19,7 @@ use crate::units::{AdcCounts, Speed};
 /// Consecutive periods without current after which the shaft counts as standing.
 const STILL_PERIODS: u16 = 1000;
 
-/// Returns true if a shaft turns too fast to be parked: it is left to slow down first.
+/// Returns true if a shaft turns too fast for a start: it is left to slow down first.
 pub(in crate::drive) fn is_too_fast(
     config: &config::Config,
     six_step: &Config,
