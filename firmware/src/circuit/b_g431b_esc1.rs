@@ -60,6 +60,13 @@ const SIX_STEP_BOUND: PwmBound = PwmBound {
     refusal: "at most 44000 in six-step",
 };
 
+/// At full throttle overmodulation and flux weakening run from the flash.
+const FIELD_ORIENTED_BOUND: PwmBound = PwmBound {
+    choice: (ParamId::CtlDrive, 0.0),
+    hz: 52_000.0,
+    refusal: "at most 52000 on this board",
+};
+
 /// Those of an image with parts of the papers.
 const PWM_BOUNDS: [PwmBound; 5] = [
     PwmBound {
@@ -78,11 +85,7 @@ const PWM_BOUNDS: [PwmBound; 5] = [
         refusal: "at most 36000 with CTL_OBSERVER 0",
     },
     SIX_STEP_BOUND,
-    PwmBound {
-        choice: (ParamId::CtlRegulator, 2.0),
-        hz: 56_000.0,
-        refusal: "at most 56000 with CTL_REGULATOR 2",
-    },
+    FIELD_ORIENTED_BOUND,
 ];
 
 /// The board as the control needs to know it.
@@ -121,7 +124,7 @@ pub const BOARD: Board = Board {
         refusal: "below this board's 750 ns",
     },
     pwm_bounds: match parts::CHOICE {
-        parts::Choice::Flight => &[SIX_STEP_BOUND],
+        parts::Choice::Flight => &[SIX_STEP_BOUND, FIELD_ORIENTED_BOUND],
         _ => &PWM_BOUNDS,
     },
 };

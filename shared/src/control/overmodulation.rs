@@ -57,16 +57,19 @@ pub fn duties(
     } else {
         config.duty_max
     };
-    let mut made = compensated.map(|share| {
+    let mut made = [over.full; 3];
+    for (phase, (made, share)) in made.iter_mut().zip(compensated).enumerate() {
+        if stays_high && phase == highest {
+            continue;
+        }
+        let most = if phase == highest {
+            config.duty_max
+        } else {
+            most
+        };
         let duty = common.saturating_add(whole(share)).max(I1F31::ZERO);
-        whole_duty(duty.min(most))
-    });
-    made[highest] = if stays_high {
-        over.full
-    } else {
-        let duty = common.saturating_add(whole(compensated[highest]));
-        whole_duty(duty.min(config.duty_max))
-    };
+        *made = whole_duty(duty.min(most));
+    }
     made
 }
 

@@ -24,6 +24,7 @@ pub fn of_share(share: I1F31, vector_max: Voltage) -> Voltage {
 const FASTER_FROM: I1F31 = I1F31::lit("0.8125");
 
 /// Returns what the end of the throttle's range adds to [`of_share`], with the square of the share beyond.
+#[inline(never)] // voltage mode alone, and the control's memory is full
 pub fn beyond(share: I1F31, vector_max: Voltage) -> Voltage {
     let more = share.max(FASTER_FROM) - FASTER_FROM;
     // The whole throttle adds 16·(3/16)², 0.56.
@@ -35,6 +36,7 @@ pub fn beyond(share: I1F31, vector_max: Voltage) -> Voltage {
 ///
 /// Near zero current the dead time's loss is not known well enough to be compensated. At 750 ns and 60 kHz it is 0.9 V,
 /// where a 3-inch motor idles at 0.5 V.
+#[inline(never)] // voltage mode alone, and the control's memory is full
 pub fn lift(least: Voltage, emf: Voltage) -> Voltage {
     // No more than at rest, where a rotor turns backwards; and none where there is no least voltage.
     least.minus(emf).min(least).max(Voltage::ZERO)

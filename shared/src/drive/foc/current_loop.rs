@@ -144,36 +144,50 @@ fn limited(
     angle: SinCos,
 ) -> Dq<Voltage> {
     shared.applied.expect_unreadable();
-    let (mut u, cut) = modulator::limit(demand, &shared.supply.longest);
-    loops.weakening.note(u, cut, &shared.supply.longest);
+    let longest = &shared.supply.longest;
+    let (u, cut) = modulator::limit(demand, longest);
     if let Some(cut) = cut {
         config.regulator.anti_windup(&mut loops.regulator, cut);
-        let longest = &shared.supply.longest;
-        if !config
-            .weakening
-            .helps(&loops.weakening, shared.seen.speed, longest)
-        {
+        let speed = shared.seen.speed;
+        if !config.weakening.helps(&loops.weakening, speed, longest) {
             loops.i_q_shortfall = loops.reference.i.q.minus(shared.seen.i.q);
         }
     }
-    if shared.supply.longest.length() > shared.supply.switched {
-        let v = inverse_park(rotate(u, loops.delay_rotation), angle);
-        let linear = config.modulator.linear.top(shared.supply.bus).scaled();
-        if let Some(over) = overmodulation::beyond_hexagon(v, linear) {
-            // Back from where the frame will be.
-            let Dq { d, q } = park(over, angle);
-            let over = park(AlphaBeta { alpha: d, beta: q }, loops.delay_rotation);
-            let over: Dq<Voltage> = Dq {
-                d: over.d.scaled(),
-                q: over.q.scaled(),
-            };
-            u = Dq {
-                d: u.d.minus(over.d),
-                q: u.q.minus(over.q),
-            };
-        }
+    // A slow rotor's flux is not weakened.
+    if longest.length() > shared.supply.switched {
+        overmodulated(config, loops, shared, (u, cut), angle)
+    } else {
+        u
     }
-    u
+}
+
+/// Returns what the hexagon leaves of a vector, of which the limit has cut a part.
+#[cold]
+#[inline(never)] // it would lengthen the shorter vectors' way
+fn overmodulated(
+    config: &Config,
+    loops: &mut Loops,
+    shared: &Shared,
+    (u, cut): (Dq<Voltage>, Option<Dq<WideVoltage>>),
+    angle: SinCos,
+) -> Dq<Voltage> {
+    loops.weakening.note(u, cut, &shared.supply.longest);
+    let v = inverse_park(rotate(u, loops.delay_rotation), angle);
+    let linear = config.modulator.linear.top(shared.supply.bus).scaled();
+    let Some(over) = overmodulation::beyond_hexagon(v, linear) else {
+        return u;
+    };
+    // Back from where the frame will be.
+    let Dq { d, q } = park(over, angle);
+    let over = park(AlphaBeta { alpha: d, beta: q }, loops.delay_rotation);
+    let over: Dq<Voltage> = Dq {
+        d: over.d.scaled(),
+        q: over.q.scaled(),
+    };
+    Dq {
+        d: u.d.minus(over.d),
+        q: u.q.minus(over.q),
+    }
 }
 
 /// Returns the observer's input at this sample.
