@@ -64,7 +64,7 @@ const SIX_STEP_BOUND: PwmBound = PwmBound {
 const FIELD_ORIENTED_BOUND: PwmBound = PwmBound {
     choice: (ParamId::CtlDrive, 0.0),
     hz: 52_000.0,
-    refusal: "at most 52000 on this board",
+    refusal: "at most 52000 field-oriented",
 };
 
 /// Those of an image with parts of the papers.
@@ -182,6 +182,7 @@ mod tests {
         for bound in BOARD.pwm_bounds {
             let (id, value) = bound.choice;
             let cause = match id {
+                ParamId::CtlDrive if value == 0.0 => "field-oriented".to_owned(),
                 ParamId::CtlDrive => "in six-step".to_owned(),
                 _ => format!("with {} {value}", id.entry().name),
             };

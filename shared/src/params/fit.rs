@@ -1,6 +1,7 @@
 //! What a board cannot do: such a value is refused, and a stored one brought within the bounds at the start.
 
 use super::board::{Board, PwmBound};
+use super::choice::CtlDrive;
 use super::table::ParamId;
 use super::values::Params;
 use crate::input::signal::Signal;
@@ -42,7 +43,7 @@ impl Params {
         board.pwm_bounds.iter().find(|bound| {
             let (id, value) = bound.choice;
             match id {
-                ParamId::CtlDrive => six_step,
+                ParamId::CtlDrive => six_step == (value == CtlDrive::SixStep.setting().1),
                 // A choice that this build lacks is kept, and another is in force.
                 _ => !six_step && self.get(id) == value && !id.lacks(value),
             }
