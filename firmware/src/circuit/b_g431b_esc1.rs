@@ -63,8 +63,8 @@ const SIX_STEP_BOUND: PwmBound = PwmBound {
 /// At full throttle overmodulation and flux weakening run from the flash.
 const FIELD_ORIENTED_BOUND: PwmBound = PwmBound {
     choice: (ParamId::CtlDrive, 0.0),
-    hz: 52_000.0,
-    refusal: "at most 52000 field-oriented",
+    hz: 48_000.0,
+    refusal: "at most 48000 field-oriented",
 };
 
 /// Those of an image with parts of the papers.

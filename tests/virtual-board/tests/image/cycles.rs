@@ -172,8 +172,9 @@ fn frequencies_hz(settings: &[Setting]) -> Vec<f32> {
 
 /// Returns the highest frequency that the board accepts with a choice.
 fn bound_hz(choice: Setting) -> f32 {
-    let mut bounds = BOARD.pwm_bounds.iter();
-    let bound = bounds.find(|bound| bound.choice == choice);
+    let find = |choice| BOARD.pwm_bounds.iter().find(|bound| bound.choice == choice);
+    // What has none of its own has the field-oriented drive's.
+    let bound = find(choice).or_else(|| find((ParamId::CtlDrive, 0.0)));
     bound.map_or(ParamId::PwmFreqHz.entry().max, |PwmBound { hz, .. }| *hz)
 }
 
