@@ -24,8 +24,12 @@ OPEN = {
     # A phase is known to be open once the rotor has been seen everywhere over some turns. Where two phases do not turn
     # the motor that far, the six-step drive's duty rises until the current trips.
     **cells([SIX], ["phase_open"], ["start"], "current", "cause", "time"),
-    **cells([SIX], ["phase_open"], ["half", "full"], "current", "cause"),
-    **cells([SIX], ["high_open", "low_open"], ["start"], "current", "cause"),
+    **cells([SIX], ["phase_open"], ["half"], "current"),
+    **cells([SIX], ["phase_open"], ["full"], "current", "cause"),
+    # At idle a six-step drive without one phase is tried again by starts that have no alignment: their current trips.
+    **cells([SIX], ["phase_open"], ["idle"], "current", "cause"),
+    # A shorted high side trips the current first; which switch it is shows in the next start alone.
+    **cells([SIX], ["high_short"], ["idle", "half"], "cause"),
     # The six-step drive keeps its full speed without this switch, within its current, and does not say so.
     **cells([SIX], ["high_open"], ["full"], "time"),
     # With a switch that never turns on, the torque that low speed allows, a drop as large as the back-EMF, takes the
@@ -47,7 +51,8 @@ OPEN = {
     # The six-step drive meets the jam with 2.8 A above 1.2 times the limit at half speed, and is 2 ms late at idle.
     **cells([SIX], ["rotor_blocked"], ["half"], "current"),
     **cells([SIX], ["rotor_blocked"], ["idle"], "time"),
-    **cells([SIX], ["rotor_blocked"], ["start"], "cause", "reaction", "time"),
+    **cells([SIX], ["rotor_blocked"], ["start"], "current", "cause", "reaction", "time"),
+    **cells([SIX], ["rotor_blocked"], ["braking"], "current"),
     **cells([FOC], ["rotor_blocked"], ["braking"], "current"),
     # Nearly all of the back-EMF vanishes faster than the currents are regulated.
     **cells([FOC, SIX], ["strike"], ["full"], "current"),
@@ -57,11 +62,6 @@ OPEN = {
     # 10 A into 470 µF is 0.9 V per period. Braking backs off ahead of the limit, but the currents lag behind a supply that
     # rises so fast, and what they still return takes it a tenth of a volt beyond the limit.
     **cells([FOC, SIX], ["disconnect"], ["braking"], "supply"),
-    # What is left in the capacitors at full speed is gone within a few periods, and with it the voltage that holds the
-    # current: 1.1 A above the bound.
-    **cells([FOC], ["disconnect"], ["full"], "current"),
-    # In its start the six-step drive shoots a short through the winding, up to the comparators' level.
-    **cells([SIX], ["high_short"], ["start"], "current"),
 }
 
 

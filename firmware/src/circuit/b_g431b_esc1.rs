@@ -76,8 +76,8 @@ const PWM_BOUNDS: [PwmBound; 5] = [
     },
     PwmBound {
         choice: (ParamId::CtlObserver, 2.0),
-        hz: 30_000.0,
-        refusal: "at most 30000 with CTL_OBSERVER 2",
+        hz: 29_000.0,
+        refusal: "at most 29000 with CTL_OBSERVER 2",
     },
     PwmBound {
         choice: (ParamId::CtlObserver, 0.0),
