@@ -23,7 +23,7 @@ OPEN = {
     **cells([FOC], ["phase_open"], ["start"], "reaction"),
     # A phase is known to be open once the rotor has been seen everywhere over some turns. Where two phases do not turn
     # the motor that far, the six-step drive's duty rises until the current trips.
-    **cells([SIX], ["phase_open"], ["start"], "current", "cause", "time"),
+    **cells([SIX], ["phase_open"], ["start"], "current", "cause"),
     **cells([SIX], ["phase_open"], ["half"], "current"),
     **cells([SIX], ["phase_open"], ["full"], "current", "cause"),
     # At idle a six-step drive without one phase is tried again by starts that have no alignment: their current trips.
@@ -37,10 +37,8 @@ OPEN = {
     # comes later.
     **cells([FOC], ["low_open"], ["start"], "current"),
     **cells([SIX], ["low_open"], ["braking"], "current", "cause"),
-    # At idle little more flows than a sound sensor may be off by. The six-step drive's start meets a sensor that shows
-    # nothing with more current.
+    # At idle little more flows than a sound sensor may be off by.
     **cells([FOC], ["sensor_zero"], ["idle"], "time"),
-    **cells([SIX], ["sensor_zero"], ["start"], "current"),
     # The control knows that a Hall sensor is at fault, and cannot continue without it at low speed.
     **cells([FOC], ["hall_stuck"], ["idle"], "reaction"),
     # After a rotor jams at speed, the six-step drive retries starts, each longer than the previous one: 1.5 s after it
@@ -51,14 +49,13 @@ OPEN = {
     # The six-step drive meets the jam with 2.8 A above 1.2 times the limit at half speed, and is 2 ms late at idle.
     **cells([SIX], ["rotor_blocked"], ["half"], "current"),
     **cells([SIX], ["rotor_blocked"], ["idle"], "time"),
-    **cells([SIX], ["rotor_blocked"], ["start"], "current", "cause", "reaction", "time"),
+    **cells([SIX], ["rotor_blocked"], ["start"], "current", "reaction"),
     **cells([SIX], ["rotor_blocked"], ["braking"], "current"),
     **cells([FOC], ["rotor_blocked"], ["braking"], "current"),
     # Nearly all of the back-EMF vanishes faster than the currents are regulated.
     **cells([FOC, SIX], ["strike"], ["full"], "current"),
     # A start that is struck is retried, which takes time.
     **cells([FOC], ["strike_torque"], ["start"], "cause", "reaction"),
-    **cells([SIX], ["strike_torque"], ["start"], "reaction"),
     # 10 A into 470 µF is 0.9 V per period. Braking backs off ahead of the limit, but the currents lag behind a supply that
     # rises so fast, and what they still return takes it a tenth of a volt beyond the limit.
     **cells([FOC, SIX], ["disconnect"], ["braking"], "supply"),
