@@ -20,12 +20,11 @@ import paths
 sys.path.insert(0, str(paths.DIALECT))
 
 from motors import FROM_MOTOR, drawn_bench, flown, motor_of, tune  # noqa: E402  (they need the dialect's folder)
+from slams import IDLE, MODES  # noqa: E402
 from thrust import PROPELLERS, bench  # noqa: E402
 
-MODES = {"speed": 0, "voltage": 2}
 SIX_STEP_SHARE = 2 / math.pi
 """A six-step's fundamental over the supply: no other switching has more."""
-IDLE = 0.055
 CELL_V = 4.1
 """A cell of a pack that is charged to 0.9."""
 LEAST = 0.97

@@ -18,14 +18,14 @@ import paths
 
 sys.path.insert(0, str(paths.DIALECT))
 
-from emulator import MOTOR, scenario, windows_of  # noqa: E402  (it needs the dialect's folder)
-from motors import FROM_MOTOR, log_uniform, toml, tune  # noqa: E402
+from emulator import MOTOR  # noqa: E402  (it needs the dialect's folder)
+from motors import FROM_MOTOR, flown, log_uniform, tune  # noqa: E402
+from slams import VOLTAGE  # noqa: E402
 
 WINDS = [0.3, 0.6, 0.8]
 KNOWN, UNKNOWN = True, False
 COAST, BRAKE = 0, 1
 STOPS = {"coast": COAST, "brake": BRAKE}
-VOLTAGE = 2
 THROTTLE = 0.5
 BLOWS_S, CUT_S, AGAIN_S, END_S = 3.0, 3.5, 5.0, 7.5
 FORWARDS_S = {KNOWN: 0.5, UNKNOWN: 1.0}
@@ -123,31 +123,19 @@ def told(tables: dict[str, dict], known: bool, stop: int) -> dict[str, dict]:
     return tables | {"params": params}
 
 
-def played(folder: Path, tables: dict[str, dict], throttle: list, windows: dict, wind_rpm: float) -> dict:
-    """Plays a scenario and returns its summary."""
-    tables["bench"]["duration_s"] = throttle[-1][0]
-    heads = [(f"[{name}]", table) for name, table in tables.items()]
-    heads += [("[[signal]]", {"at_s": at_s, "throttle": share}) for at_s, share in throttle]
-    heads += [("[[window]]", {"name": name, "t0_s": t0, "t1_s": t1}) for name, (t0, t1) in windows.items()]
-    if wind_rpm:
-        heads.append(("[[fault]]", {"at_s": BLOWS_S, "kind": "gust", "value": -wind_rpm}))
-    file = folder / "windmill.toml"
-    file.write_text("\n".join(f"{head}\n{toml(table)}" for head, table in heads))
-    status, summary = scenario(file)
-    assert status == 0
-    return summary
-
-
 def half_rpm(folder: Path, tables: dict[str, dict]) -> float:
     """Returns the speed at half throttle, in calm air."""
     windows = {"half": (BLOWS_S - 0.1, BLOWS_S)}
-    summary = played(folder, tables, [(0.0, 0.0), (0.5, THROTTLE), (BLOWS_S, THROTTLE)], windows, 0.0)
-    return windows_of(summary)["half"]["rpm_mean"]
+    tables["bench"]["duration_s"] = BLOWS_S
+    _, seen = flown(folder, tables, [(0.0, 0.0), (0.5, THROTTLE)], windows)
+    return seen["half"]["rpm_mean"]
 
 
 def blown(folder: Path, tables: dict[str, dict], known: bool, wind_rpm: float) -> Outcome:
     """Blows against a motor from below while it turns, through a throttle cut, and through what comes then."""
-    throttle = [(0.0, 0.0), (0.5, THROTTLE), (CUT_S, 0.0), (AGAIN_S, THROTTLE), (END_S, THROTTLE)]
+    tables["bench"]["duration_s"] = END_S
+    throttle = [(0.0, 0.0), (0.5, THROTTLE), (CUT_S, 0.0), (AGAIN_S, THROTTLE)]
+    gust = {"at_s": BLOWS_S, "kind": "gust", "value": -wind_rpm}
     windows = {
         "before": (CUT_S - 0.1, CUT_S),
         "cut": (AGAIN_S - 0.05, AGAIN_S),
@@ -155,10 +143,9 @@ def blown(folder: Path, tables: dict[str, dict], known: bool, wind_rpm: float) -
         "forwards": (AGAIN_S + FORWARDS_S[known], END_S),
         "end": (END_S - 0.1, END_S),
     }
-    summary = played(folder, tables, throttle, windows, wind_rpm)
-    found = windows_of(summary)
+    warned, found = flown(folder, tables, throttle, windows, (gust,))
     return Outcome(
-        summary["faults"] + summary.get("warnings", []),
+        warned,
         wind_rpm,
         found["cut"]["rpm_mean"],
         found["forwards"]["rpm_min"],
