@@ -321,7 +321,7 @@ pub fn short(u: Dq<WideVoltage>) -> Dq<Voltage> {
 }
 
 /// A voltage vector as phases, each as a share of the supply.
-pub(super) struct Phases {
+pub struct Phases {
     /// What each phase has above their mean.
     pub(super) shares: [Share; 3],
     /// The same, and what the dead time takes away: `dead_time` times the certainty of the phase current's sign.
@@ -331,7 +331,7 @@ pub(super) struct Phases {
 impl Phases {
     /// Returns the phases of a vector.
     #[inline(always)] // in each period
-    pub(super) fn new(
+    pub fn new(
         supply: &Supply,
         v: AlphaBeta<TurnedVoltage>,
         order: PhaseOrder,
@@ -356,20 +356,9 @@ impl Phases {
     }
 }
 
-/// Returns the three duties of a voltage vector within which every phase can be read.
-///
-/// Adds to each duty what the dead time takes away: `dead_time` times the certainty of the phase current's
-/// sign.
+/// Returns the three duties of a voltage vector within which every phase can be read, with what the dead time takes away.
 #[inline(always)] // in each period
-pub fn duties(
-    config: &Config,
-    supply: &Supply,
-    v: AlphaBeta<TurnedVoltage>,
-    order: PhaseOrder,
-    dead_time: &dead_time::Config,
-    certainty: AlphaBeta<I8F24>,
-) -> [Duty; 3] {
-    let phases = Phases::new(supply, v, order, dead_time, certainty);
+pub fn duties(config: &Config, phases: &Phases) -> [Duty; 3] {
     let common = config.common(phases.shares);
     let [a, b, c] = phases.compensated;
     [duty(common, a), duty(common, b), duty(common, c)]
@@ -380,7 +369,8 @@ pub fn duties(
 #[inline(always)] // as a call it costs 48 bytes more on the chip
 pub fn uncompensated(config: &Config, supply: &Supply, v: AlphaBeta<TurnedVoltage>) -> [Duty; 3] {
     let (order, none) = (PhaseOrder::NORMAL, &dead_time::Config::NONE);
-    duties(config, supply, v, order, none, AlphaBeta::default())
+    let phases = Phases::new(supply, v, order, none, AlphaBeta::default());
+    duties(config, &phases)
 }
 
 /// Returns a phase's duty, which is below 1.

@@ -8,11 +8,10 @@
 //! vector to the hexagon's corners; a six-step's is 0.637: Holtz, "Pulsewidth modulation for electronic power
 //! conversion", Proc. IEEE 82 (1994), section IV.
 
-use fixed::types::{I1F31, I8F24};
+use fixed::types::I1F31;
 
-use super::dead_time;
-use super::modulator::{Config, Phases, Supply, whole, whole_duty};
-use super::transform::{AlphaBeta, PhaseOrder};
+use super::modulator::{Config, Phases, whole, whole_duty};
+use super::transform::AlphaBeta;
 use crate::math::TopProduct;
 use crate::units::{Duty, TurnedVoltage, Voltage};
 
@@ -21,18 +20,11 @@ const NO_LONGER: I1F31 = I1F31::from_bits(1 << 23);
 
 /// Returns the three duties of a voltage vector that [`limit`](super::modulator::limit) and [`beyond_hexagon`] have
 /// shortened, as [`duties`](super::modulator::duties) does of a short one.
-pub fn duties(
-    config: &Config,
-    supply: &Supply,
-    v: AlphaBeta<TurnedVoltage>,
-    order: PhaseOrder,
-    dead_time: &dead_time::Config,
-    certainty: AlphaBeta<I8F24>,
-) -> [Duty; 3] {
+pub fn duties(config: &Config, phases: &Phases) -> [Duty; 3] {
     let Phases {
         shares,
         compensated,
-    } = Phases::new(supply, v, order, dead_time, certainty);
+    } = *phases;
     let common = config.common(shares);
     let [a, b, c] = shares;
     let highest = if a >= b && a >= c {
@@ -117,8 +109,10 @@ pub fn beyond_hexagon(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::modulator::Modulation;
+    use crate::control::dead_time;
+    use crate::control::modulator::{Modulation, Supply};
     use crate::control::sensing::Shunts::{self, Three, Two};
+    use crate::control::transform::PhaseOrder;
     use crate::units::Speed;
     use core::f64::consts::TAU;
 
@@ -154,8 +148,8 @@ mod tests {
         };
         // A duty above 1 fills the period.
         let (order, none) = (PhaseOrder::NORMAL, &dead_time::Config::NONE);
-        let duties = duties(config, &supply, v, order, none, AlphaBeta::default())
-            .map(|d| d.to_num::<f64>().min(1.0));
+        let phases = Phases::new(&supply, v, order, none, AlphaBeta::default());
+        let duties = duties(config, &phases).map(|d| d.to_num::<f64>().min(1.0));
         ((v.alpha.to_num(), v.beta.to_num()), duties)
     }
 

@@ -122,14 +122,8 @@ fn compensation_is_added() {
         beta: I8F24::from_num(-20.0 / 3.0_f64.sqrt()),
     };
     let v = AlphaBeta::default();
-    let made = duties(
-        &config,
-        &supply,
-        v,
-        PhaseOrder::NORMAL,
-        &dead_time,
-        certainty,
-    );
+    let phases = Phases::new(&supply, v, PhaseOrder::NORMAL, &dead_time, certainty);
+    let made = duties(&config, &phases);
     let [a, b, c] = made.map(|d| d.to_num::<f64>());
     assert!((a - 0.505).abs() < 1e-6, "{a}");
     assert!((b - 0.485).abs() < 1e-6, "{b}");

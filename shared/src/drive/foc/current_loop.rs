@@ -2,7 +2,7 @@
 
 use super::state::{Loops, State};
 use crate::control::delay::Delay;
-use crate::control::modulator::Supply;
+use crate::control::modulator::{Phases, Supply};
 use crate::control::observer::Input;
 use crate::control::transform::{AlphaBeta, Dq, PhaseOrder, inverse_park, park, rotate, voltages};
 use crate::control::{modulator, overmodulation, start};
@@ -102,14 +102,9 @@ pub(super) fn current_loop(
         [a, b, c]
     } else {
         let certainty = inverse_park(loops.dead_time_sign, frame.angle);
-        modulator::duties(
-            &config.modulator,
-            &shared.supply,
-            v,
-            loops.phase_order,
-            &config.dead_time,
-            certainty,
-        )
+        let (order, dead_time) = (loops.phase_order, &config.dead_time);
+        let phases = Phases::new(&shared.supply, v, order, dead_time, certainty);
+        modulator::duties(&config.modulator, &phases)
     };
     shared.applied.command(duties);
     Bridge::Duty(duties)
@@ -120,17 +115,14 @@ pub(super) fn current_loop(
 #[inline(never)] // few periods
 fn long_duties(config: &Config, loops: &Loops, supply: &Supply, angle: SinCos) -> [Duty; 3] {
     let [v, _] = loops.commanded_voltages;
-    overmodulation::duties(
-        &config.modulator,
-        supply,
-        AlphaBeta {
-            alpha: v.alpha.scaled(),
-            beta: v.beta.scaled(),
-        },
-        loops.phase_order,
-        &config.dead_time,
-        inverse_park(loops.dead_time_sign, angle),
-    )
+    let v = AlphaBeta {
+        alpha: v.alpha.scaled(),
+        beta: v.beta.scaled(),
+    };
+    let (order, dead_time) = (loops.phase_order, &config.dead_time);
+    let certainty = inverse_park(loops.dead_time_sign, angle);
+    let phases = Phases::new(supply, v, order, dead_time, certainty);
+    overmodulation::duties(&config.modulator, &phases)
 }
 
 /// Handles a voltage vector too long to read every phase, or for the supply. Anti-windup: the regulator's

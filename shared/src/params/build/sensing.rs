@@ -160,7 +160,7 @@ mod tests {
     use core::f32::consts::TAU;
 
     use super::*;
-    use crate::control::modulator::Supply;
+    use crate::control::modulator::{Phases, Supply};
     use crate::control::overmodulation::duties;
     use crate::control::transform::{AlphaBeta, PhaseOrder};
     use crate::drive::Config;
@@ -224,14 +224,9 @@ mod tests {
                     alpha: I8F24::from_num(20.0 * cos),
                     beta: I8F24::from_num(20.0 * sin),
                 };
-                let made = duties(
-                    &config.modulator,
-                    &supply,
-                    v,
-                    PhaseOrder::NORMAL,
-                    &config.dead_time,
-                    certainty,
-                );
+                let (order, dead_time) = (PhaseOrder::NORMAL, &config.dead_time);
+                let phases = Phases::new(&supply, v, order, dead_time, certainty);
+                let made = duties(&config.modulator, &phases);
                 let mut made = made.map(|d| d.to_num::<f32>());
                 made.sort_by(f32::total_cmp);
                 greatest = (greatest.0.max(made[2]), greatest.1.max(made[1]));
