@@ -7,10 +7,11 @@ use siskin_control::parts::Part;
 
 /// Returns a parameter's entry in the metadata.
 fn metadata(id: ParamId) -> &'static str {
-    let begin = format!("{{\"name\":\"{}\"", id.entry().name);
-    let at = PARAMETER_METADATA.find(&begin).expect("it is listed");
-    let entry = &PARAMETER_METADATA[at + 1..];
-    &entry[..entry.find("{\"name\":").unwrap_or(entry.len())]
+    let name = format!("\"name\":\"{}\"", id.entry().name);
+    PARAMETER_METADATA
+        .split("{\"type\":")
+        .find(|entry| entry.contains(&name))
+        .expect("it is listed")
 }
 
 /// Every choice that needs a part: its parameter, number, meaning and part.

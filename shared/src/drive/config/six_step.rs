@@ -32,7 +32,7 @@ pub struct Config {
     pub start_current: Current,
     /// Largest current of a motor test.
     pub test_current: Current,
-    /// Samples for which Ramp waits where it has seen no back-EMF; where it has, [`PATIENCE_SEEN`] times as long.
+    /// Samples for which Ramp waits where it has seen no back-EMF; where it has, `PATIENCE_SEEN` times as long.
     pub patience: u16,
     /// Periods after which a start's first Ramp without a full turn of consecutive crossings has failed; each further
     /// one has twice the time.
