@@ -16,6 +16,7 @@ REQUIRED = {
     ("siskin_firmware", "interrupt", "period", "Interrupt", "hold"): ".control",
     ("siskin_control", "drive", "step", "outer_loop_slice"): ".control",
     ("siskin_control", "drive", "foc", "outer_loop", "supply"): ".control",
+    ("siskin_control", "drive", "foc", "current_loop", "long_duties"): ".control",
     ("siskin_control", "control", "modulator", "Supply", "update_limits"): ".control",
     ("siskin_firmware", "interrupt", "overruns", "Overruns", "note"): ".control_more",
     ("siskin_firmware", "exchange", "word", "pack"): ".control_more",
