@@ -63,7 +63,10 @@ class Body:
         self.last_turns = (0.0, 0.0, 0.0, 0.0)
 
     def advance(self, seconds: float, rotors, wind) -> None:
-        """Advances with the rotors at these speeds in rad/s, never negative, and the wind in the earth's axes."""
+        """Advances with the rotors at these speeds in rad/s and the wind in the earth's axes.
+
+        A rotor that the wind turns backwards, at a negative speed, brakes the fall a little: that is left out.
+        """
         dt = seconds / INNER_STEPS
         growth = [(now - before) / seconds for now, before in zip(rotors, self.last_turns)]
         for inner in range(1, INNER_STEPS + 1):
@@ -89,10 +92,10 @@ class Body:
         spin = 0.0
         for (x, y), way, turn, rate, through in zip(PLACES, TURNS, turns, growth, self.inflow(wind)):
             advance = min(max(through / (PITCH * turn), -0.5), 1.0) if turn > 100.0 else 0.0
-            lift = THRUST * turn * turn * (1.0 - advance)
+            lift = THRUST * max(turn, 0.0) ** 2 * (1.0 - advance)
             lean = LEAN * lift
             force = [force[0] + lean * air[0], force[1] + lean * air[1], force[2] + lift]
-            drag = DRAG * turn * turn * (1.0 - DRAG_LOST * max(advance, 0.0))
+            drag = DRAG * turn * abs(turn) * (1.0 - DRAG_LOST * max(advance, 0.0))
             torque = [torque[0] + y * lift, torque[1] - x * lift, torque[2] - way * (drag + ROTOR_INERTIA * rate)]
             spin += way * ROTOR_INERTIA * turn
         for at, push in self._ground():

@@ -3,12 +3,11 @@
 import hashlib
 import struct
 
-import plan
 from betaflight import Betaflight
 from body import Body
+from judge import STEP_NS
+from plan import Plan
 from quadrotor import Quadrotor, value_of
-
-STEP_NS = 1_000_000
 
 
 def sensors(body: Body) -> list[float]:
@@ -21,17 +20,17 @@ def sensors(body: Body) -> list[float]:
     return [p, -q, -r, *felt, w, x, -y, -z, -west, north, up, 0.0, 0.0, height, 101_325.0 - 12.0 * height]
 
 
-def fly(folder, escs) -> list[dict]:
-    """Flies once; returns what there was after each step. Betaflight runs in a folder that has its settings."""
-    quadrotor, pilot, betaflight = Quadrotor(escs), plan.Pilot(), Betaflight(folder)
+def fly(folder, escs, plan: Plan) -> list[dict]:
+    """Flies a plan once; returns what there was after each step. Betaflight runs in a folder that has its settings."""
+    quadrotor, betaflight = Quadrotor(escs), Betaflight(folder)
     body = quadrotor.body
     rows, sticks = [], []
     try:
         for step in range(round(plan.END_S * 1e9) // STEP_NS):
             now_ns = step * STEP_NS
             now_s = now_ns * 1e-9
-            if now_ns % pilot.EVERY_NS == 0:
-                sticks = pilot.sticks(now_s, body.place[2], body.speed[2])
+            if now_ns % plan.EVERY_NS == 0:
+                sticks = plan.sticks(now_s, body.place[2], body.speed[2])
             written_ns, outputs = betaflight.advance(now_ns + STEP_NS, sensors(body), sticks)
             values = [value_of(us) for us in outputs]
             # It begins to write once it has calibrated its gyro.
@@ -41,7 +40,7 @@ def fly(folder, escs) -> list[dict]:
                 for esc, value in enumerate(values)
                 if writes and not plan.silent(now_s, esc)
             ]
-            quadrotor.advance(STEP_NS, frames, plan.wind(now_s), plan.struck(now_s), plan.supply_v(now_s))
+            quadrotor.advance(STEP_NS, frames, plan.wind(now_s), plan.struck(now_s), plan.pack(now_s))
             rows.append({"s": now_s + STEP_NS * 1e-9, "values": values, **seen(quadrotor)})
     finally:
         betaflight.close()

@@ -18,23 +18,27 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
 
 import flight
-import plan
 from betaflight import EEPROM
 from build import build
 from escs import Escs
 from judge import Verdict, judge
+from plan import Plan
+from punch import Punch
+from tour import Tour
+
+PLANS = {"tour": Tour, "punch": Punch}
 
 
-def fly(mode: int) -> tuple[list[dict], Verdict, str]:
-    """Flies once with this `CTL_MODE`; returns what there was at each step, the verdict, and a hash over all of it."""
+def fly(plan: Plan, mode: int) -> tuple[list[dict], Verdict, str]:
+    """Flies a plan once with this `CTL_MODE`; returns what there was at each step, the verdict, and a hash over all of it."""
     with tempfile.TemporaryDirectory() as folder, contextlib.closing(Escs("--param", f"CTL_MODE={mode}")) as escs:
         shutil.copy(EEPROM, folder)
-        rows = flight.fly(Path(folder), escs)
+        rows = flight.fly(Path(folder), escs, plan)
         summary = escs.summary()
-        return rows, judge(rows, escs.all, summary), flight.hash_of(rows, summary)
+        return rows, judge(plan, rows, escs.all, summary), flight.hash_of(rows, summary)
 
 
-def record(rows: list[dict], path: Path) -> None:
+def record(plan: Plan, rows: list[dict], path: Path) -> None:
     """Writes a flight as CSV, one line per step."""
     with open(path, "w", newline="") as file:
         table = csv.writer(file)
@@ -48,6 +52,7 @@ def record(rows: list[dict], path: Path) -> None:
 
 def main() -> int:
     words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    words.add_argument("--plan", choices=PLANS, default="tour", help="which flight (tour)")
     words.add_argument("--mode", type=int, default=2, help="CTL_MODE: 0 speed, 2 voltage (2)")
     words.add_argument("--times", type=int, default=1, help="how many flights (1)")
     words.add_argument("--record", type=Path, help="CSV file for the first one")
@@ -58,13 +63,14 @@ def main() -> int:
     hashes = []
     broken = False
     for number in range(options.times):
-        rows, verdict, hashed = fly(options.mode)
+        plan = PLANS[options.plan]()
+        rows, verdict, hashed = fly(plan, options.mode)
         hashes.append(hashed)
         broken |= bool(verdict.broken)
         if number == 0:
             print(verdict)
             if options.record:
-                record(rows, options.record)
+                record(plan, rows, options.record)
         print(f"flight {number + 1}: hash {hashed}, {len(verdict.broken)} bounds broken")
     return int(broken or len(set(hashes)) > 1)
 

@@ -1,5 +1,5 @@
 //! Draws a flight recorded by `tests/flight/fly.py --record`, as SVG and PNG:
-//! `cargo run -p siskin-tests --example flight-picture -- target/flight.csv target`
+//! `cargo run -p siskin-tests --example flight-picture -- target/flight.csv target` draws `target/flight.svg`.
 
 use std::error::Error;
 use std::path::Path;
@@ -14,17 +14,22 @@ const POINTS: usize = 1000;
 const PANEL: (u32, u32) = (2400, 480);
 
 /// Lasting events, with their background colour.
-const EVENTS: [(&str, RGBColor); 6] = [
+const EVENTS: [(&str, RGBColor); 9] = [
     ("climb", RGBColor(0xdf, 0xef, 0xfa)),
     ("hover", RGBColor(0xe9, 0xf6, 0xf0)),
     ("roll", RGBColor(0xfd, 0xf1, 0xcf)),
     ("gust", RGBColor(0xf8, 0xe8, 0xf1)),
     ("weak pack", RGBColor(0xf9, 0xe4, 0xd8)),
     ("descent", RGBColor(0xdf, 0xef, 0xfa)),
+    ("punch", RGBColor(0xfd, 0xf1, 0xcf)),
+    ("disarmed", RGBColor(0xf8, 0xe8, 0xf1)),
+    ("sag", RGBColor(0xf9, 0xe4, 0xd8)),
 ];
 
 /// A flight by rows: time first, the event last.
 struct Flight {
+    /// The record's, and the picture's.
+    name: String,
     heads: csv::StringRecord,
     rows: Vec<Vec<f64>>,
     events: Vec<String>,
@@ -41,7 +46,9 @@ impl Flight {
             rows.push(numbers.collect::<Result<_, _>>()?);
             events.push(record[heads.len() - 1].to_owned());
         }
+        let name = path.file_stem().unwrap_or_default();
         Ok(Self {
+            name: name.to_string_lossy().into_owned(),
             heads,
             rows,
             events,
@@ -103,6 +110,12 @@ impl Flight {
     }
 
     fn figure(&self) -> Figure {
+        let breaks = self.column("breaks");
+        let lines = if self.rows.iter().any(|row| row[breaks] > 0.0) {
+            "; lines: a propeller strikes, an ESC's wire is silent for 50 ms"
+        } else {
+            ""
+        };
         let speeds = ["rear right", "front right", "rear left", "front left"];
         let speeds = speeds.iter().zip(["rpm_1", "rpm_2", "rpm_3", "rpm_4"]);
         let speeds = speeds.map(|(name, head)| self.curve(name, head));
@@ -111,10 +124,8 @@ impl Flight {
             self.curve("pitch", "pitch_deg"),
         ];
         Figure {
-            name: "flight".to_owned(),
-            title: "Betaflight flies on four emulated ESCs; lines: a propeller strikes, \
-                    an ESC's wire is silent for 50 ms"
-                .to_owned(),
+            name: self.name.clone(),
+            title: format!("Betaflight flies on four emulated ESCs{lines}"),
             columns: 1,
             panel: PANEL,
             panels: vec![

@@ -18,10 +18,10 @@ def built():
     build.build()
 
 
-@pytest.mark.parametrize("mode", [0, 2], ids=["speed", "voltage"])
-def test_a_flight_keeps_its_bounds_and_is_the_same_twice(tmp_path, mode):
+@pytest.mark.parametrize(("plan", "mode"), [("tour", 0), ("tour", 2), ("punch", 2)])
+def test_a_flight_keeps_its_bounds_and_is_the_same_twice(tmp_path, plan, mode):
     records = [tmp_path / "first.csv", tmp_path / "second.csv"]
-    command = [sys.executable, build.FLIGHT / "fly.py", "--mode", str(mode), "--record"]
+    command = [sys.executable, build.FLIGHT / "fly.py", "--plan", plan, "--mode", str(mode), "--record"]
     with contextlib.ExitStack() as flying:
         # Side by side, at whatever pace each of them gets.
         flights = [
@@ -40,4 +40,4 @@ def test_a_flight_keeps_its_bounds_and_is_the_same_twice(tmp_path, mode):
     assert records[0].read_bytes() == records[1].read_bytes()
     assert PICTURE.exists(), "it is built by cargo build -p siskin-tests --example flight-picture"
     subprocess.run([PICTURE, records[0], tmp_path], check=True, timeout=60)
-    assert xml.parse(tmp_path / "flight.svg").getroot().tag.endswith("svg")
+    assert xml.parse(tmp_path / "first.svg").getroot().tag.endswith("svg")
