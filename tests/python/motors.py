@@ -4,6 +4,7 @@ import json
 import math
 import random
 import subprocess
+from pathlib import Path
 
 from emulator import SETTINGS, scenario, windows_of
 from paths import TOOL
@@ -140,17 +141,19 @@ def drawn_bench(motor: dict) -> dict[str, dict]:
     }
 
 
-def flown(folder, tables: dict, throttle: list, windows: dict, faults: tuple = ()) -> tuple[list, dict]:
-    """Plays a scenario with these tables, times and throttles, windows by name, and tables of what goes wrong.
-
-    Returns its faults and warnings, and its windows by name.
-    """
+def written(folder, tables: dict, throttle: list, windows: dict, faults: tuple = ()) -> Path:
+    """Writes a scenario with these tables, times and throttles, windows by name, and tables of what goes wrong."""
     heads = [(f"[{name}]", table) for name, table in tables.items()]
     heads += [("[[signal]]", {"at_s": at_s, "throttle": share}) for at_s, share in throttle]
     heads += [("[[window]]", {"name": name, "t0_s": t0, "t1_s": t1}) for name, (t0, t1) in windows.items()]
     heads += [("[[fault]]", fault) for fault in faults]
     file = folder / "flight.toml"
     file.write_text("\n".join(f"{head}\n{toml(table)}" for head, table in heads))
-    status, found = scenario(file)
+    return file
+
+
+def flown(folder, tables: dict, throttle: list, windows: dict, faults: tuple = ()) -> tuple[list, dict]:
+    """Plays what `written` writes; returns its faults and warnings, and its windows by name."""
+    status, found = scenario(written(folder, tables, throttle, windows, faults))
     assert status == 0
     return found["faults"] + found.get("warnings", []), windows_of(found)

@@ -5,14 +5,10 @@ fault therefore comes at four angles, a quarter of an electrical turn apart: ove
 side differs by 7 %.
 """
 
-import json
-import subprocess
-
 import pytest
+from board import on_board
 from emulator import scenario, windows_of
-from paths import IMAGES, VIRTUAL_BOARD
 
-IMAGE = IMAGES / "b-g431b-esc1.elf"
 HALF, FULL = "half", "full"
 FAULT_S = {HALF: 1.8, FULL: 2.6}
 """When the fault comes: speeds have settled."""
@@ -53,13 +49,6 @@ def written(path, moment: str, fault: str, later_s: float = 0.0) -> None:
         for name, (t0_s, t1_s) in WINDOWS_S.items()
     ]
     path.write_text("\n\n".join(parts))
-
-
-def on_board(path) -> dict:
-    command = [VIRTUAL_BOARD, IMAGE, "--storage", "none", "scenario", path, "--json"]
-    ended = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120)
-    assert ended.returncode == 0, ended.stderr
-    return json.loads(ended.stdout)
 
 
 def in_emulator(path, moment: str, fault: str) -> list[dict]:
