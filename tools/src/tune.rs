@@ -14,21 +14,17 @@ use crate::params::{NAME_LENGTH, Param};
 use crate::{given, json, param_file, param_text};
 
 /// The motor, and what else its settings are computed from.
-const MADE_OF: [ParamId; 10] = [
+const MADE_OF: [ParamId; 9] = [
     ParamId::MotPolePairs,
     ParamId::MotRMohm,
     ParamId::MotLUh,
     ParamId::MotFluxMwb,
     ParamId::MotJGcm2,
     ParamId::CtlRpmMax,
-    ParamId::PwmFreqHz,
     ParamId::PwmDeadtimeNs,
     ParamId::LimPhaseA,
     ParamId::LimBusVMax,
 ];
-
-/// Minimum PWM periods per electrical turn at `CTL_RPM_MAX`.
-const TURN_PERIODS: f32 = 20.0;
 
 /// A setting in force.
 struct Setting {
@@ -61,13 +57,9 @@ pub(crate) fn run(
         // 300 rpm suits the first bench's motor.
         set(&mut params, ParamId::CtlRpmMin, 0.0)?;
     }
-    let pwm = pwm(&params.in_force());
-    set(&mut params, ParamId::PwmFreqHz, pwm.value)?;
     let made = params.in_force();
-    let followed = FromMotor::new(&made).reasons(&made);
-    let mut settings = Vec::from(followed.map(|(id, value, from)| Setting { id, value, from }));
-    settings.push(pwm);
-    settings.sort_by_key(|setting| setting.id as usize);
+    let followed = FromMotor::new(&made).reasons(&params);
+    let settings = followed.map(|(id, value, from)| Setting { id, value, from });
     if let Some(path) = &args.output {
         let of_motor = MADE_OF
             .iter()
@@ -104,20 +96,6 @@ fn param(params: &Params, id: ParamId) -> Param {
     }
 }
 
-/// Returns the PWM frequency that the speed at full throttle needs.
-fn pwm(params: &Params) -> Setting {
-    let id = ParamId::PwmFreqHz;
-    let as_it_is = params.get(id);
-    let turns_hz = params.get(ParamId::CtlRpmMax) * params.get(ParamId::MotPolePairs) / 60.0;
-    let wanted = (TURN_PERIODS * turns_hz).min(id.entry().max);
-    let (value, from) = if wanted > as_it_is {
-        (wanted, "20 periods a turn at CTL_RPM_MAX")
-    } else {
-        (as_it_is, "as it was")
-    };
-    Setting { id, value, from }
-}
-
 /// Returns the motor, with what is assumed about it, and each setting in force with what it follows from.
 fn table(params: &Params, made: &Params, settings: &[Setting]) -> String {
     let mut out = String::new();
@@ -152,24 +130,4 @@ fn table(params: &Params, made: &Params, settings: &[Setting]) -> String {
 /// Rounds to as many digits as people read.
 fn three_digits(value: f32) -> f32 {
     format!("{value:.2e}").parse().unwrap_or(value)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_fast_motor_gets_twenty_periods_a_turn_as_far_as_there_are() {
-        for (max_rpm, wanted_hz) in [
-            (10_000.0, 24_000.0),
-            (18_000.0, 42_000.0),
-            (60_000.0, 60_000.0),
-        ] {
-            let mut params = Params::default();
-            for (id, value) in [(ParamId::MotPolePairs, 7.0), (ParamId::CtlRpmMax, max_rpm)] {
-                params.set(id, value).expect("in range");
-            }
-            assert_eq!(pwm(&params).value, wanted_hz);
-        }
-    }
 }

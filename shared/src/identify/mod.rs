@@ -380,7 +380,8 @@ impl Identify {
     /// Replaces the parameters' motor by the one known so far, and what follows from it.
     pub(crate) fn assume(&self, params: &mut Params) {
         for id in ParamId::ALL {
-            if id.entry().kind == Kind::FromMotor {
+            // The PWM's frequency stays what the timer runs at.
+            if id.entry().kind == Kind::FromMotor && id != ParamId::PwmFreqHz {
                 let _ = params.set(id, 0.0);
             }
         }

@@ -6,6 +6,7 @@
 use core::f32::consts::TAU;
 
 use super::choice::{CtlDrive, CtlMode};
+use super::pwm::{self, Pwm};
 use super::table::{Choice, ParamId};
 use super::values::Params;
 use crate::math::SQRT_3;
@@ -43,7 +44,7 @@ impl Params {
     }
 
     /// Returns the parameters that a drive is built from: `CTL_DRIVE` is decided, and what is unknown of the motor is
-    /// assumed.
+    /// assumed; `PWM_FREQ_HZ` follows from it where it is 0.
     ///
     /// If `CTL_DRIVE` is 2 and R, L or flux is unknown, throttle is a share of the supply and `CTL_RPM_MAX` does not
     /// bind.
@@ -56,8 +57,16 @@ impl Params {
             made.assume(ParamId::MotPolePairs, POLE_PAIRS);
         }
         let pole_pairs = made.get(ParamId::MotPolePairs);
+        if self.get(ParamId::PwmFreqHz) == 0.0 {
+            let hz = if unknown {
+                pwm::UNKNOWN_HZ
+            } else {
+                Pwm::new(&made).hz()
+            };
+            made.assume(ParamId::PwmFreqHz, ParamId::PwmFreqHz.held(hz));
+        }
         if unknown {
-            let fastest_hz = self.get(ParamId::PwmFreqHz) / TURN_PERIODS;
+            let fastest_hz = made.get(ParamId::PwmFreqHz) / TURN_PERIODS;
             let resistance_ohm = DROP_SHARE / SQRT_3 * supply_v / limit_a;
             made.assume(ParamId::MotRMohm, 1e3 * resistance_ohm);
             made.assume(ParamId::MotLUh, 1e6 * WINDING_S * resistance_ohm);
@@ -148,8 +157,8 @@ mod tests {
         let automatic = with(&[CtlDrive::Automatic.setting()]);
         let chosen = with(&[CtlDrive::FieldOriented.setting()]);
         assert_eq!(automatic.unknown(), None);
-        assert_eq!(automatic.in_force(), chosen);
-        assert_eq!(chosen.in_force(), chosen);
+        assert_eq!(automatic.in_force(), chosen.in_force());
+        assert_eq!(chosen.in_force().get(ParamId::PwmFreqHz), 24_000.0);
         assert!(build(&automatic, &Board::BENCH) == build(&chosen, &Board::BENCH));
     }
 

@@ -5,6 +5,7 @@
 
 use core::f32::consts::{PI, TAU};
 
+use super::pwm::Pwm;
 #[cfg(doc)]
 use super::table::Kind;
 use super::table::ParamId;
@@ -107,8 +108,9 @@ impl FromMotor {
         }
     }
 
-    /// Returns each setting in the table's order, with what it follows from, or that it was chosen.
-    pub fn reasons(&self, params: &Params) -> [(ParamId, f32, &'static str); 8] {
+    /// Returns each setting of these parameters in the table's order, with what it follows from, or that it was chosen.
+    pub fn reasons(&self, stated: &Params) -> [(ParamId, f32, &'static str); 9] {
+        let params = &stated.in_force();
         let motor = Motor::new(params);
         let run = motor.rpm(self.ramp_a, self.dead_v);
         let slowest = motor.rpm(self.ramp_a, LEAST_DEAD_SHARE * self.dead_v);
@@ -133,6 +135,10 @@ impl FromMotor {
             "a fifth of STA_RAMP_A's torque over J",
             "12 electrical turns to STA_RUN_RPM",
         ];
+        let of_pwm = match stated.unknown() {
+            Some(_) => "the motor is not known",
+            None => Pwm::new(params).from(),
+        };
         let settings = [
             (
                 ParamId::CtlRpmMin,
@@ -154,6 +160,7 @@ impl FromMotor {
                 self.speed_hz,
                 text(speed, least(speed), of_speed),
             ),
+            (ParamId::PwmFreqHz, motor.pwm_hz, of_pwm),
             (ParamId::StaParkAs, self.park_as, "0.4 s of STA_RAMP_A"),
             (ParamId::StaRampA, self.ramp_a, "a fifth of LIM_PHASE_A"),
             (
@@ -167,9 +174,19 @@ impl FromMotor {
                 text(run, most(run), of_run),
             ),
         ];
-        settings.map(|(id, value, from)| match params.get(id) {
-            0.0 => (id, value, from),
-            _ => (id, value, "chosen"),
+        settings.map(|(id, value, from)| {
+            // In force it is never 0.
+            let params = if id == ParamId::PwmFreqHz {
+                stated
+            } else {
+                params
+            };
+            let from = if params.get(id) == 0.0 {
+                from
+            } else {
+                "chosen"
+            };
+            (id, value, from)
         })
     }
 }
@@ -325,7 +342,7 @@ pub(super) mod tests {
         assert_eq!(made.current_hz, 240.0);
         assert!((made.speed_hz - 12.0).abs() < 1e-3, "{made:?}");
         let reasons = made.reasons(&params);
-        let [_, _, current, speed, _, ramp, ..] = reasons;
+        let [_, _, current, speed, _, _, ramp, ..] = reasons;
         assert_eq!(current, (ParamId::CtlBwCurHz, 240.0, "chosen"));
         assert_eq!(ramp, (ParamId::StaRampA, 4.0, "chosen"));
         assert_eq!(

@@ -7,6 +7,7 @@ mod fit;
 mod from_motor;
 mod packed;
 mod preset;
+mod pwm;
 mod table;
 mod values;
 

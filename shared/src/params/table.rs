@@ -379,7 +379,7 @@ parameters! {
         in Propeller;
     38 CtlWeaken "CTL_WEAKEN" "%" Real 0.0..100.0 = 80.0
         "Share of the flux that i_d may take away where the supply is used up; 0 is none";
-    40 PwmFreqHz "PWM_FREQ_HZ" "Hz" Real 8000.0..60000.0 = 24000.0 restart
+    40 PwmFreqHz "PWM_FREQ_HZ" "Hz" FromMotor 8000.0..60000.0 = 0.0 restart
         "PWM frequency; the control runs once a period";
     41 PwmDeadtimeNs "PWM_DEADTIME_NS" "ns" Real 0.0..3000.0 = 500.0 restart
         "Time for which both switches of a phase stay off at each change; a board has its least";

@@ -41,7 +41,7 @@ impl Bench {
     /// Returns what the parameters make of the motor with this drift.
     fn built(&self, drift: Drift) -> Config {
         let mut config = Config::default();
-        build_in(self.esc.params(), &Board::BENCH, drift, &mut config).expect("it fits");
+        build_in(&self.esc.running(), &Board::BENCH, drift, &mut config).expect("it fits");
         config
     }
 

@@ -31,6 +31,7 @@ use si::{Si, TEST_SHARE, TOO_FEW_PERIODS};
 
 use super::board::{Board, TRIP_SHARE};
 use super::choice::{CtlDrive, CtlModulation, CtlObserver, Inp3d, LimPolicy, MotDir, MotStop};
+use super::pwm::BUS_UNITS_MIN;
 use super::table::ParamId;
 use super::values::Params;
 use crate::control::low_speed;
@@ -47,9 +48,6 @@ const EDGES_TURNS: f32 = 1.0 / 12.0;
 
 /// Highest supply in units of voltage; the type holds eight.
 const BUS_UNITS_MAX: f32 = 6.0;
-
-/// Lowest supply in units of voltage, where the range of the modulator's reciprocal ends.
-const BUS_UNITS_MIN: f32 = 0.125;
 
 /// Time for which ξ̂ may stay at the end of its range, s: far longer than any transient that the observer recovers
 /// from.

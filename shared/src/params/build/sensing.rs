@@ -176,7 +176,7 @@ mod tests {
         };
         let params = Params::of(&BOSSO_BENCH);
         let config = build(&params, &board).expect("it makes a drive");
-        let period_s = 1.0 / params.get(ParamId::PwmFreqHz);
+        let period_s = config.scale.period_s;
         let charged = |periods: u32| periods as f32 * config.charge.duty.to_num::<f32>() * period_s;
         let all = config.charge.periods;
         assert!((1e-3..1.02e-3).contains(&charged(all)), "{}", charged(all));

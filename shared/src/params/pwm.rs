@@ -1,0 +1,151 @@
+//! The PWM frequency that follows from the motor where `PWM_FREQ_HZ` is 0.
+
+use core::f32::consts::{FRAC_PI_2, TAU};
+
+use super::choice::CtlMode;
+use super::table::ParamId;
+use super::values::Params;
+use crate::math::SQRT_3;
+
+/// PWM periods per electrical turn at full speed.
+const TURN_PERIODS: f32 = 20.0;
+
+/// Least frequency that follows, Hz: above what people hear. A slow motor gets a lower one, whose voltages are then large
+/// enough for the control's numbers.
+const QUIET_HZ: f32 = 24_000.0;
+
+/// Frequency while the motor is not known, Hz.
+pub(super) const UNKNOWN_HZ: f32 = 48_000.0;
+
+/// Lowest supply in units of voltage, where the range of the modulator's reciprocal ends.
+pub(super) const BUS_UNITS_MIN: f32 = 0.125;
+
+/// What is kept of that for a flux that was measured too low.
+const UNITS_SHARE: f32 = 0.8;
+
+/// Full speed over the one whose back-EMF is `LIM_BUS_V_MAX`, where no parameter bounds it: a charged pack and a
+/// propeller leave that much.
+const LOADED_SHARE: f32 = 0.8;
+
+/// Frequencies that follow from a motor, Hz.
+pub(super) struct Pwm {
+    /// Enough periods a turn at full speed.
+    fast: f32,
+    /// The highest that the control's numbers allow.
+    most: f32,
+}
+
+impl Pwm {
+    /// Takes the parameters, with what is assumed of the motor's poles.
+    pub(super) fn new(params: &Params) -> Self {
+        let get = |id| params.get(id);
+        let supply_v = get(ParamId::LimBusVMax);
+        let flux_wb = 1e-3 * get(ParamId::MotFluxMwb);
+        let turns_hz = match params.choice() {
+            CtlMode::Speed => get(ParamId::MotPolePairs) * get(ParamId::CtlRpmMax) / 60.0,
+            CtlMode::Torque | CtlMode::Voltage => {
+                LOADED_SHARE * supply_v / (SQRT_3 * TAU * flux_wb)
+            }
+        };
+        Self {
+            fast: TURN_PERIODS * turns_hz,
+            most: UNITS_SHARE * supply_v / (BUS_UNITS_MIN * FRAC_PI_2 * flux_wb),
+        }
+    }
+
+    /// Returns the frequency, without the bounds of the parameter's range.
+    pub(super) fn hz(&self) -> f32 {
+        self.fast.max(QUIET_HZ).min(self.most)
+    }
+
+    /// Returns what it follows from.
+    pub(super) fn from(&self) -> &'static str {
+        if self.hz() == self.most {
+            "as high as flux and LIM_BUS_V_MAX allow"
+        } else if self.hz() == self.fast {
+            "20 periods a turn at full speed"
+        } else {
+            "nobody hears it"
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::from_motor::tests::RACING;
+    use crate::params::{BOSSO_MOTOR, Board, build};
+
+    fn in_force(values: &[(ParamId, f32)]) -> f32 {
+        let mut params = Params::of(&BOSSO_MOTOR);
+        for (id, value) in RACING
+            .iter()
+            .chain([&(ParamId::PwmFreqHz, 0.0)])
+            .chain(values)
+        {
+            params.set(*id, *value).expect("in range");
+        }
+        params.in_force().get(ParamId::PwmFreqHz)
+    }
+
+    /// 7 pole pairs.
+    #[test]
+    fn a_fast_motor_gets_twenty_periods_a_turn_as_far_as_there_are() {
+        for (max_rpm, hz) in [
+            (10_000.0, 24_000.0),
+            (18_000.0, 42_000.0),
+            (60_000.0, 60_000.0),
+        ] {
+            assert_eq!(in_force(&[(ParamId::CtlRpmMax, max_rpm)]), hz);
+        }
+        // In voltage mode by the supply: 0.8·20 V/(√3·2π·0.3215 mWb) is 4573 Hz.
+        let voltage = [CtlMode::Voltage.setting(), (ParamId::CtlRpmMax, 10_000.0)];
+        assert_eq!(in_force(&voltage), 60_000.0);
+        assert_eq!(
+            in_force(&[(ParamId::PwmFreqHz, 30_000.0), voltage[0]]),
+            30_000.0
+        );
+    }
+
+    #[test]
+    fn a_motor_that_is_not_known_gets_the_same_whatever_it_is() {
+        for flux_mwb in [0.1, 30.0] {
+            let values = [(ParamId::MotRMohm, 0.0), (ParamId::MotFluxMwb, flux_mwb)];
+            assert_eq!(in_force(&values), UNKNOWN_HZ);
+        }
+    }
+
+    /// A gimbal's motor of 140 rpm/V, with 7 pole pairs, at 12 V; its ESC measures up to 2 A.
+    #[test]
+    fn a_slow_motor_gets_what_the_numbers_allow() {
+        let mut params = Params::of(&BOSSO_MOTOR);
+        for (id, value) in [
+            (ParamId::MotPolePairs, 7.0),
+            (ParamId::MotFluxMwb, 5.6),
+            (ParamId::MotRMohm, 6300.0),
+            (ParamId::MotLUh, 1750.0),
+            (ParamId::MotJGcm2, 80.0),
+            (ParamId::LimBusVMax, 14.0),
+            (ParamId::LimBusVMin, 9.0),
+            (ParamId::LimPhaseA, 1.0),
+            (ParamId::CtlRpmMax, 1500.0),
+            (ParamId::CtlRpmMin, 0.0),
+            (ParamId::PwmFreqHz, 0.0),
+        ] {
+            params.set(id, value).expect("in range");
+        }
+        // 0.8·14 V/(π/2·5.6 mWb/8).
+        let hz = params.in_force().get(ParamId::PwmFreqHz);
+        assert!((hz - 10_186.0).abs() < 10.0, "{hz}");
+        let board = Board {
+            current_a_per_count: 2.0 / 2048.0,
+            current_range_a: 2.0,
+            greatest_phase: Board::greatest_phase(2.0),
+            ..Board::BENCH
+        };
+        build(&params, &board).expect("it makes a drive");
+        params.set(ParamId::PwmFreqHz, 24_000.0).expect("in range");
+        let error = build(&params, &board).expect_err("too high");
+        assert_eq!(error.param, ParamId::PwmFreqHz);
+    }
+}
