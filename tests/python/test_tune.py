@@ -17,11 +17,7 @@ def flight(folder, number: int, plant: str) -> tuple[bool, bool]:
     assert followed.keys() == {*FROM_MOTOR, "PWM_FREQ_HZ"}
     tables = drawn_bench(motor)
     tables["bench"] |= {"duration_s": 3.5, "plant": plant}
-    tables["params"] = {
-        **motor["params"],
-        "PWM_FREQ_HZ": followed["PWM_FREQ_HZ"],
-        **dict.fromkeys(FROM_MOTOR, 0),
-    }
+    tables["params"] = motor["params"] | dict.fromkeys(followed, 0)
     throttle = [(0.0, 0.0), (0.5, 0.3), (2.5, 0.9)]
     windows = {"all": (0.0, 3.5), "slow": (2.2, 2.5), "end": (3.4, 3.5)}
     faults, windows = flown(folder, tables, throttle, windows)

@@ -7,15 +7,16 @@ use super::table::ParamId;
 use super::values::Params;
 use crate::math::SQRT_3;
 
-/// PWM periods per electrical turn at full speed.
+/// PWM periods per electrical turn at `CTL_RPM_MAX`.
 const TURN_PERIODS: f32 = 20.0;
 
 /// Least frequency that follows, Hz: above what people hear. A slow motor gets a lower one, whose voltages are then large
 /// enough for the control's numbers.
 const QUIET_HZ: f32 = 24_000.0;
 
-/// Frequency while the motor is not known, Hz.
-pub(super) const UNKNOWN_HZ: f32 = 48_000.0;
+/// Frequency while the motor is not known, Hz: six-step then follows up to 1905 Hz electrical, and the first board's
+/// processor has time to spare.
+pub(super) const UNKNOWN_HZ: f32 = 40_000.0;
 
 /// Lowest supply in units of voltage, where the range of the modulator's reciprocal ends.
 pub(super) const BUS_UNITS_MIN: f32 = 0.125;
@@ -23,9 +24,9 @@ pub(super) const BUS_UNITS_MIN: f32 = 0.125;
 /// What is kept of that for a flux that was measured too low.
 const UNITS_SHARE: f32 = 0.8;
 
-/// Full speed over the one whose back-EMF is `LIM_BUS_V_MAX`, where no parameter bounds it: a charged pack and a
-/// propeller leave that much.
-const LOADED_SHARE: f32 = 0.8;
+/// PWM periods per electrical turn at the speed whose back-EMF is `LIM_BUS_V_MAX`, where no parameter bounds the speed: a
+/// pack and a propeller leave two thirds of it, where there are 15.
+const UNLOADED_PERIODS: f32 = 10.0;
 
 /// Frequencies that follow from a motor, Hz.
 pub(super) struct Pwm {
@@ -41,14 +42,17 @@ impl Pwm {
         let get = |id| params.get(id);
         let supply_v = get(ParamId::LimBusVMax);
         let flux_wb = 1e-3 * get(ParamId::MotFluxMwb);
-        let turns_hz = match params.choice() {
-            CtlMode::Speed => get(ParamId::MotPolePairs) * get(ParamId::CtlRpmMax) / 60.0,
+        let fast = match params.choice() {
+            CtlMode::Speed => {
+                let turns_hz = get(ParamId::MotPolePairs) * get(ParamId::CtlRpmMax) / 60.0;
+                TURN_PERIODS * turns_hz
+            }
             CtlMode::Torque | CtlMode::Voltage => {
-                LOADED_SHARE * supply_v / (SQRT_3 * TAU * flux_wb)
+                UNLOADED_PERIODS * supply_v / (SQRT_3 * TAU * flux_wb)
             }
         };
         Self {
-            fast: TURN_PERIODS * turns_hz,
+            fast,
             most: UNITS_SHARE * supply_v / (BUS_UNITS_MIN * FRAC_PI_2 * flux_wb),
         }
     }
@@ -63,7 +67,7 @@ impl Pwm {
         if self.hz() == self.most {
             "as high as flux and LIM_BUS_V_MAX allow"
         } else if self.hz() == self.fast {
-            "20 periods a turn at full speed"
+            "enough periods a turn at full speed"
         } else {
             "nobody hears it"
         }
@@ -98,9 +102,9 @@ mod tests {
         ] {
             assert_eq!(in_force(&[(ParamId::CtlRpmMax, max_rpm)]), hz);
         }
-        // In voltage mode by the supply: 0.8·20 V/(√3·2π·0.3215 mWb) is 4573 Hz.
+        // In voltage mode by the supply: 20 V/(√3·2π·0.3215 mWb) is 5716 Hz.
         let voltage = [CtlMode::Voltage.setting(), (ParamId::CtlRpmMax, 10_000.0)];
-        assert_eq!(in_force(&voltage), 60_000.0);
+        assert!((in_force(&voltage) - 57_163.0).abs() < 10.0);
         assert_eq!(
             in_force(&[(ParamId::PwmFreqHz, 30_000.0), voltage[0]]),
             30_000.0
