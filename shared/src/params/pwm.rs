@@ -14,9 +14,8 @@ const TURN_PERIODS: f32 = 20.0;
 /// enough for the control's numbers.
 const QUIET_HZ: f32 = 24_000.0;
 
-/// Frequency while the motor is not known, Hz: six-step then follows up to 1905 Hz electrical, and the first board's
-/// processor has time to spare.
-pub(super) const UNKNOWN_HZ: f32 = 40_000.0;
+/// Frequency while the motor is not known, Hz: the highest of six-step on the first board.
+pub(super) const UNKNOWN_HZ: f32 = 44_000.0;
 
 /// Lowest supply in units of voltage, where the range of the modulator's reciprocal ends.
 pub(super) const BUS_UNITS_MIN: f32 = 0.125;
