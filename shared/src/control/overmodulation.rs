@@ -49,19 +49,18 @@ pub fn duties(config: &Config, phases: &Phases) -> [Duty; 3] {
     } else {
         config.duty_max
     };
-    let mut made = [over.full; 3];
-    for (phase, (made, share)) in made.iter_mut().zip(compensated).enumerate() {
-        if stays_high && phase == highest {
-            continue;
-        }
-        let most = if phase == highest {
-            config.duty_max
-        } else {
-            most
-        };
+    let duty = |share, most| {
         let duty = common.saturating_add(whole(share)).max(I1F31::ZERO);
-        *made = whole_duty(duty.min(most));
-    }
+        whole_duty(duty.min(most))
+    };
+    // Not by `map`, which becomes a loop in a build optimised for size.
+    let [a, b, c] = compensated;
+    let mut made = [duty(a, most), duty(b, most), duty(c, most)];
+    made[highest] = if stays_high {
+        over.full
+    } else {
+        duty(compensated[highest], config.duty_max)
+    };
     made
 }
 
@@ -97,8 +96,8 @@ pub fn beyond_hexagon(
         centred.wrapping_sub(centred.min(most).max(-most))
     };
     let (a, b, c) = (over(v.alpha), over(b), over(c));
-    let any = a != TurnedVoltage::ZERO || b != TurnedVoltage::ZERO || c != TurnedVoltage::ZERO;
-    any.then(|| AlphaBeta {
+    let any = a.to_bits() | b.to_bits() | c.to_bits();
+    (any != 0).then(|| AlphaBeta {
         alpha: (a.wrapping_add(a).wrapping_sub(b).wrapping_sub(c))
             .top(THIRD)
             .scaled(),

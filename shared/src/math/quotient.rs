@@ -16,9 +16,11 @@ pub fn divide(numerator: u64, divisor: u32) -> u64 {
     // With the divisor's top bit set, an estimate is at most two too large.
     let shift = divisor.leading_zeros();
     let divisor_shifted = divisor << shift;
-    let shifted = (u64::from(rest) << 32 | u64::from(numerator as u32)) << shift;
-    let low = shifted as u32;
-    let (first, rest) = digit((shifted >> 32) as u32, low >> 16, divisor_shifted);
+    // By words: the chip has no shift of 64 bits. What is left is below the divisor, and loses no bit.
+    let low = numerator as u32;
+    let rest = rest << shift | low >> 1 >> (31 - shift);
+    let low = low << shift;
+    let (first, rest) = digit(rest, low >> 16, divisor_shifted);
     let (second, _) = digit(rest, low & 0xffff, divisor_shifted);
     u64::from(high / divisor) << 32 | u64::from(first << 16 | second)
 }

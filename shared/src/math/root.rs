@@ -45,7 +45,13 @@ fn root(x: u64) -> u32 {
         return 0;
     }
     let even = x.leading_zeros() & !1;
-    let m = ((x << even) >> 32) as u32;
+    // Of 32-bit words: the chip has no shift of 64 bits.
+    let (high, low) = ((x >> 32) as u32, x as u32);
+    let m = if even < 32 {
+        high << even | low >> 1 >> (31 - even)
+    } else {
+        low << (even - 32)
+    };
     let mut y = (1 << 30) + (u32::from(RECIPROCAL_ROOT[(m >> 25) as usize - 32]) << 22);
     for _ in 0..2 {
         // y·(3 − m·y²)/2, with 30 fraction bits in y and 32 in m.
@@ -53,7 +59,11 @@ fn root(x: u64) -> u32 {
         y = top(y, (3 << 28) - m_y2) << 3;
     }
     // √m = m·(1/√m) with 30 fraction bits; 32 are wanted before undoing the shift.
-    ((u64::from(top(m, y)) << 2) >> (even / 2)) as u32
+    let root = top(m, y);
+    match even / 2 {
+        small @ 0..2 => root << (2 - small),
+        large => root >> (large - 2),
+    }
 }
 
 fn top(a: u32, b: u32) -> u32 {
