@@ -35,7 +35,7 @@
 //! | PWM: `ADC1_2` on the G431, `ADC` on the F405 | 0, alone | 131 instructions besides `step`, the fault record included; 133 more in every sixteenth period or so at 24 kHz, for a snapshot; and some 100 when the bridge is turned on or off | everything |
 //! | gate driver's nFAULT: `EXTI15_10`, F405 | 1, alone | 20 instructions | everything but the PWM |
 //! | clock (`TIM4`), serial lines, DMA, throttle timer | 2 | one waker each, below 5 µs by their length | tasks, not each other |
-//! | throttle task, in the interrupt of an unused peripheral: `FMAC`, `CAN2_SCE` | 2 | some 4200 instructions for a DShot600 frame and its answer, half of them after it or before the frame; up to 5 µs of waiting for a frame's last edge | the other tasks, and drivers' interrupts but not their DMA; the PWM for the 0.4 µs in which a reply starts |
+//! | throttle task, in the interrupt of an unused peripheral: `USART3`, `CAN2_SCE` | 2 | some 4200 instructions for a DShot600 frame and its answer, half of them after it or before the frame; up to 5 µs of waiting for a frame's last edge | the other tasks, and drivers' interrupts but not their DMA; the PWM for the 0.4 µs in which a reply starts |
 //! | all other tasks | thread mode | | nothing |
 //!
 //! Code at priorities 0 and 1 uses no critical section, no lock, no logging and no executor type. Fault

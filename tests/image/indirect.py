@@ -12,7 +12,7 @@ EXITED = r"^embassy_executor::raw::poll_exited$"
 
 LEADS_TO = [
     # An executor runs what has been woken; the throttle task's is an interrupt.
-    (r"^embassy_executor::.*Executor::(run|poll)$|^(FMAC|CAN2_SCE)$", rf"{TASK}|{EXITED}"),
+    (r"^embassy_executor::.*Executor::(run|poll)$|^(USART3|CAN2_SCE)$", rf"{TASK}|{EXITED}"),
     # A waker's table: of the time queue, and of channels and pipes that a task waits for.
     (
         rf"^(_embassy_time_schedule_wake|embassy_time_queue_utils::|embassy_sync::waitqueue::)|{TASK}"

@@ -50,7 +50,7 @@ def report(board: Board, image: Image) -> list[str]:
     print(limited("stack at most", sum(b.size for _, b in levels), room, problems))
     for name, bound in levels:
         print(f"  {name:<22}{bound.size:>8}  {path(bound.path)}")
-    return problems + calls.problems
+    return problems + stack.lost_vectors(calls) + calls.problems
 
 
 def main() -> int:

@@ -32,6 +32,17 @@ def vectors(calls: Calls) -> list[Function]:
     return list(found.values())
 
 
+def lost_vectors(calls: Calls) -> list[str]:
+    """Returns the handlers beyond the table's copy in RAM, which would not be found there."""
+    image = calls.image
+    table = next(s for s in image.sections if s.name == ".vector_table")
+    copied = image.symbols["__ram_vectors_end"] - image.symbols["__ram_vectors"]
+    default = image.symbols["DefaultHandler"] & ~1
+    beyond = (image.word(table.begin + at) & ~1 for at in range(copied, table.size, WORD))
+    lost = (image.functions.get(target) for target in beyond if target != default)
+    return [f"the vector of {f.name} is not copied to RAM: see _ram_vectors" for f in lost if f]
+
+
 def thread_tasks(calls: Calls) -> frozenset[Function]:
     """Returns the other executor's tasks: none calls anything of the throttle's except through its port."""
     functions = calls.image.functions

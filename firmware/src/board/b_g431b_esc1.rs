@@ -174,7 +174,7 @@ pub(crate) mod wire {
 
 parts! {
     throttle: PA15 at TIM2 Ch1,
-    executor: FMAC,
+    executor: USART3,
     edges: DMA1_CH4 DMA1_CH5,
     replies: TIM3 DMA1_CH6,
 }

@@ -51,16 +51,16 @@ pub fn set_trip(phase_a: f32) {
 fn vectors_in_ram(scb: &mut SCB) {
     unsafe extern "C" {
         static __vector_table: UnsafeCell<u32>;
-        static __vector_table_end: UnsafeCell<u32>;
         static __ram_vectors: UnsafeCell<u32>;
+        static __ram_vectors_end: UnsafeCell<u32>;
     }
-    // SAFETY: the linker script reserves as much room at the destination as the table takes at the source,
+    // SAFETY: the linker script reserves this room at the destination, no longer than the table and
     // aligned to 512, and nothing else is there. The table is written before it is used.
     unsafe {
-        let from = __vector_table.get();
-        let words = __vector_table_end.get().offset_from(from) as usize;
-        from.copy_to_nonoverlapping(__ram_vectors.get(), words);
-        scb.vtor.write(__ram_vectors.get() as u32);
+        let to = __ram_vectors.get();
+        let words = __ram_vectors_end.get().offset_from(to) as usize;
+        __vector_table.get().copy_to_nonoverlapping(to, words);
+        scb.vtor.write(to as u32);
     }
     cortex_m::asm::dsb();
 }
