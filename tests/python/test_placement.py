@@ -12,11 +12,10 @@ from small_image import build
 LINK = ROOT / "firmware" / "link"
 
 REQUIRED = {
-    ("siskin_firmware", "interrupt", "pwm", "Pwm", "change"): ".control",
     ("siskin_firmware", "interrupt", "period", "Interrupt", "hold"): ".control",
     ("siskin_control", "drive", "step", "outer_loop_slice"): ".control",
     ("siskin_control", "drive", "foc", "outer_loop", "supply"): ".control",
-    ("siskin_control", "drive", "foc", "current_loop", "long_duties"): ".control",
+    ("siskin_control", "drive", "foc", "current_loop", "limited"): ".control",
     ("siskin_control", "control", "modulator", "Supply", "update_limits"): ".control",
     ("siskin_firmware", "interrupt", "overruns", "Overruns", "note"): ".control_more",
     ("siskin_firmware", "exchange", "word", "pack"): ".control_more",
@@ -33,6 +32,9 @@ REQUIRED = {
 OTHERS = {
     ("siskin_control", "math", "gain", "parts"): (".once", 0x200),
     ("siskin_firmware", "interrupt", "pwm", "Pwm", "start"): (".once", 4),
+    ("siskin_firmware", "interrupt", "pwm", "Pwm", "change"): (".once", 4),
+    ("siskin_firmware", "interrupt", "pwm", "Pwm", "second"): (".control", 4),
+    ("siskin_firmware", "interrupt", "leg", "Leg", "compare"): (".control", 4),
     ("siskin_firmware", "exchange", "ends", "ConfigWriter", "write"): (".once", 4),
     ("siskin_control", "drive", "foc", "outer_loop", "reference"): (".control", 0x1800),
     ("siskin_control", "math", "root", "leg"): (".control_more", 0x800),

@@ -60,11 +60,10 @@ const SIX_STEP_BOUND: PwmBound = PwmBound {
     refusal: "at most 44000 in six-step",
 };
 
-/// At full throttle overmodulation and flux weakening run from the flash.
 const FIELD_ORIENTED_BOUND: PwmBound = PwmBound {
     choice: (ParamId::CtlDrive, 0.0),
-    hz: 48_000.0,
-    refusal: "at most 48000 field-oriented",
+    hz: 54_000.0,
+    refusal: "at most 54000 field-oriented",
 };
 
 /// Those of an image with parts of the papers.
@@ -76,8 +75,8 @@ const PWM_BOUNDS: [PwmBound; 5] = [
     },
     PwmBound {
         choice: (ParamId::CtlObserver, 2.0),
-        hz: 29_000.0,
-        refusal: "at most 29000 with CTL_OBSERVER 2",
+        hz: 30_000.0,
+        refusal: "at most 30000 with CTL_OBSERVER 2",
     },
     PwmBound {
         choice: (ParamId::CtlObserver, 0.0),

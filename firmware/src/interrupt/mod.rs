@@ -4,6 +4,8 @@
 
 #[cfg(board)]
 mod gate_driver;
+#[cfg(board)]
+mod leg;
 #[cfg_attr(
     not(any(board, test)),
     expect(dead_code, reason = "for the boards; tested on the host")

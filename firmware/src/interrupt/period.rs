@@ -94,7 +94,7 @@ impl Interrupt {
     #[inline(never)] // only some periods
     fn hold(&mut self) {
         self.pwm.commutate();
-        self.pwm.apply(Bridge::Off);
+        self.pwm.off();
         if !self.gate_driver.ready() {
             self.found = Some(Fault::OverCurrent);
         }

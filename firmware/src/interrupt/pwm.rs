@@ -19,10 +19,11 @@
 
 use embassy_stm32::pac::timer::TimAdv;
 use embassy_stm32::pac::timer::regs::{Ccr1ch, SrAdv};
-use embassy_stm32::pac::timer::vals::{Bkp, Cms, Dir, FilterValue, Mms, Ocm, Ossi, Ossr};
+use embassy_stm32::pac::timer::vals::{Bkp, Cms, Dir, FilterValue, Mms, Ossi, Ossr};
 use siskin_control::drive::Bridge;
 use siskin_control::units::Duty;
 
+use super::leg::{Leg, Modes};
 use super::timing::{Timing, compare};
 use crate::board::{PHASES, SAMPLING_CLOCKS};
 use crate::chip::bridge::turn_off;
@@ -34,8 +35,8 @@ pub(crate) struct Pwm {
     top: u16,
     /// The low sides as the last [`apply`](Self::apply) wrote them.
     low_sides: LowSides,
-    /// Legs that follow all switches off, in the next commutation.
-    deferred: Option<[Leg; 3]>,
+    /// What follows all switches off, in the next commutation.
+    deferred: Option<Modes>,
 }
 
 impl Pwm {
@@ -69,7 +70,7 @@ impl Pwm {
             low_sides: LowSides::None,
             deferred: None,
         };
-        pwm.set_modes([Leg::Off; 3]);
+        pwm.set_modes(Modes::off());
         // From here on modes and enable bits wait for a commutation, channel 4's too.
         timer.cr2().modify(|w| w.set_ccpc(true));
         pwm.commutate();
@@ -112,8 +113,8 @@ impl Pwm {
 
     #[cold]
     fn second(&mut self) {
-        if let Some(legs) = self.deferred.take() {
-            self.set_modes(legs);
+        if let Some(modes) = self.deferred.take() {
+            self.set_modes(modes);
             self.timer.egr().write(|w| w.set_comg(true));
         }
     }
@@ -153,7 +154,7 @@ impl Pwm {
         }
         match (bridge, self.low_sides) {
             (Bridge::Brake, LowSides::Switching) => self.set_compares([0; 3]),
-            (Bridge::Off, LowSides::None) => turn_off(self.timer),
+            (Bridge::Off, _) => self.off(),
             (Bridge::Charge(share), LowSides::Alone) => {
                 self.set_compares([Leg::Low(share).compare(self.top); 3]);
             }
@@ -162,6 +163,8 @@ impl Pwm {
     }
 
     /// Applies a command that differs from the previous one in more than its duties.
+    #[cold]
+    #[inline(never)] // only some periods
     fn change(&mut self, bridge: Bridge) {
         let switching =
             |[a, b, c]: [Duty; 3]| [Leg::Switching(a), Leg::Switching(b), Leg::Switching(c)];
@@ -182,13 +185,14 @@ impl Pwm {
         self.set_compares([a.compare(top), b.compare(top), c.compare(top)]);
         let with_high_sides =
             |low: LowSides| matches!(low, LowSides::Switching | LowSides::Some(_));
+        let modes = Modes::of(legs);
         let (present, modes) = match (self.low_sides, wanted) {
-            (before, LowSides::Alone) if with_high_sides(before) => (LowSides::None, [Leg::Off; 3]),
+            (before, LowSides::Alone) if with_high_sides(before) => (LowSides::None, Modes::off()),
             (LowSides::Alone, after) if with_high_sides(after) => {
-                self.deferred = Some(legs);
-                (wanted, [Leg::Off; 3])
+                self.deferred = Some(modes);
+                (wanted, Modes::off())
             }
-            _ => (wanted, legs),
+            _ => (wanted, modes),
         };
         self.low_sides = present;
         self.set_modes(modes);
@@ -197,10 +201,12 @@ impl Pwm {
 
     /// Turns all switches off at once by the main output; the modes follow in the next commutation, since a drive that
     /// ends has had a long period.
-    fn off(&mut self) {
+    pub(crate) fn off(&mut self) {
         turn_off(self.timer);
-        self.low_sides = LowSides::None;
-        self.deferred = Some([Leg::Off; 3]);
+        if self.low_sides != LowSides::None {
+            self.low_sides = LowSides::None;
+            self.deferred = Some(Modes::off());
+        }
     }
 
     fn turn_on(&mut self) {
@@ -220,41 +226,12 @@ impl Pwm {
     }
 
     /// Writes the modes for the next commutation.
-    fn set_modes(&mut self, legs: [Leg; 3]) {
-        let [first, second, third] = [legs[PHASES[0]], legs[PHASES[1]], legs[PHASES[2]]];
-        self.timer.ccmr_output(0).write(|w| {
-            w.set_ocm(0, first.mode());
-            w.set_ocpe(0, true);
-            w.set_ocm(1, second.mode());
-            w.set_ocpe(1, true);
-        });
-        self.timer.ccmr_output(1).write(|w| {
-            w.set_ocm(0, third.mode());
-            w.set_ocpe(0, true);
-            // Trigger.
-            w.set_ocm(1, Ocm::PWM_MODE2);
-        });
-        self.timer.ccer().write(|w| {
-            w.set_cce(0, first.enables_high());
-            w.set_ccne(0, first.enables_low());
-            w.set_cce(1, second.enables_high());
-            w.set_ccne(1, second.enables_low());
-            w.set_cce(2, third.enables_high());
-            w.set_ccne(2, third.enables_low());
-            w.set_cce(3, true);
-        });
+    fn set_modes(&mut self, modes: Modes) {
+        let [first, second] = modes.outputs;
+        self.timer.ccmr_output(0).write_value(first);
+        self.timer.ccmr_output(1).write_value(second);
+        self.timer.ccer().write_value(modes.enables);
     }
-}
-
-/// The state of a phase for one period.
-#[derive(Clone, Copy)]
-enum Leg {
-    /// Both switches off.
-    Off,
-    /// Low side on for this share, around the top; high side off.
-    Low(Duty),
-    /// High side on for this share, low side for the rest.
-    Switching(Duty),
 }
 
 /// Phases with both switches off, a bit each.
@@ -275,34 +252,4 @@ enum LowSides {
     Some(OpenLegs),
     /// Alternate with the high sides in all phases.
     Switching,
-}
-
-impl Leg {
-    /// Returns the mode: while the reference output is high, the high side is on, or the low side alone.
-    fn mode(self) -> Ocm {
-        match self {
-            // The reference is forced low.
-            Self::Off => Ocm::FORCE_INACTIVE,
-            // High above the compare value: around the top.
-            Self::Low(_) => Ocm::PWM_MODE2,
-            Self::Switching(_) => Ocm::PWM_MODE1,
-        }
-    }
-
-    /// In a phase that is off, one enabled output keeps the other driven.
-    fn enables_high(self) -> bool {
-        !matches!(self, Self::Low(_))
-    }
-
-    fn enables_low(self) -> bool {
-        !matches!(self, Self::Off)
-    }
-
-    fn compare(self, top: u16) -> u32 {
-        match self {
-            Self::Off => 0,
-            Self::Low(share) => u32::from(top).saturating_sub(compare(share, top)),
-            Self::Switching(duty) => compare(duty, top),
-        }
-    }
 }
