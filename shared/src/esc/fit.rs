@@ -45,7 +45,7 @@ impl Overrides {
         let mut running = params.clone();
         self.put(&mut running);
         // Only what waits for a restart differs, and the direction, which fits either way.
-        let param = if params.in_force().get(ParamId::PwmFreqHz) == self.pwm_freq_hz {
+        let param = if params.pwm_hz() == self.pwm_freq_hz {
             ParamId::PwmDeadtimeNs
         } else {
             ParamId::PwmFreqHz
@@ -99,7 +99,7 @@ impl PowerUp {
         };
         Self {
             overrides: Overrides {
-                pwm_freq_hz: params.in_force().get(ParamId::PwmFreqHz),
+                pwm_freq_hz: params.pwm_hz(),
                 pwm_deadtime_ns: params.get(ParamId::PwmDeadtimeNs),
                 opposite: false,
             },

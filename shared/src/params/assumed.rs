@@ -6,7 +6,6 @@
 use core::f32::consts::TAU;
 
 use super::choice::{CtlDrive, CtlMode};
-use super::pwm::{self, Pwm};
 use super::table::{Choice, ParamId};
 use super::values::Params;
 use crate::math::SQRT_3;
@@ -34,6 +33,14 @@ impl Params {
         needed.into_iter().find(|id| self.get(*id) == 0.0)
     }
 
+    /// Returns the pole pairs, assumed if they are not known.
+    pub(super) fn pole_pairs(&self) -> f32 {
+        match self.get(ParamId::MotPolePairs) {
+            0.0 => POLE_PAIRS,
+            stated => stated,
+        }
+    }
+
     /// Returns true if the drive in force is the six-step drive.
     pub(super) fn drives_by_six_step(&self) -> bool {
         match self.choice() {
@@ -53,18 +60,9 @@ impl Params {
         let unknown = self.unknown().is_some();
         let supply_v = self.get(ParamId::LimBusVMax);
         let limit_a = self.get(ParamId::LimPhaseA);
-        if self.get(ParamId::MotPolePairs) == 0.0 {
-            made.assume(ParamId::MotPolePairs, POLE_PAIRS);
-        }
-        let pole_pairs = made.get(ParamId::MotPolePairs);
-        if self.get(ParamId::PwmFreqHz) == 0.0 {
-            let hz = if unknown {
-                pwm::UNKNOWN_HZ
-            } else {
-                Pwm::new(&made).hz()
-            };
-            made.assume(ParamId::PwmFreqHz, ParamId::PwmFreqHz.held(hz));
-        }
+        let pole_pairs = self.pole_pairs();
+        made.assume(ParamId::MotPolePairs, pole_pairs);
+        made.assume(ParamId::PwmFreqHz, self.pwm_hz());
         if unknown {
             let fastest_hz = made.get(ParamId::PwmFreqHz) / TURN_PERIODS;
             let resistance_ohm = DROP_SHARE / SQRT_3 * supply_v / limit_a;

@@ -15,7 +15,7 @@ const TURN_PERIODS: f32 = 20.0;
 const QUIET_HZ: f32 = 24_000.0;
 
 /// Frequency while the motor is not known, Hz: the highest of six-step on the first board.
-pub(super) const UNKNOWN_HZ: f32 = 44_000.0;
+const UNKNOWN_HZ: f32 = 44_000.0;
 
 /// Lowest supply in units of voltage, where the range of the modulator's reciprocal ends.
 pub(super) const BUS_UNITS_MIN: f32 = 0.125;
@@ -27,6 +27,22 @@ const UNITS_SHARE: f32 = 0.8;
 /// pack and a propeller leave two thirds of it, where there are 15.
 const UNLOADED_PERIODS: f32 = 10.0;
 
+impl Params {
+    /// Returns the PWM frequency in force, Hz.
+    pub fn pwm_hz(&self) -> f32 {
+        let stated = self.get(ParamId::PwmFreqHz);
+        if stated != 0.0 {
+            return stated;
+        }
+        let hz = if self.unknown().is_some() {
+            UNKNOWN_HZ
+        } else {
+            Pwm::new(self).hz()
+        };
+        ParamId::PwmFreqHz.held(hz)
+    }
+}
+
 /// Frequencies that follow from a motor, Hz.
 pub(super) struct Pwm {
     /// Enough periods a turn at full speed.
@@ -36,14 +52,14 @@ pub(super) struct Pwm {
 }
 
 impl Pwm {
-    /// Takes the parameters, with what is assumed of the motor's poles.
+    /// Takes the parameters of a motor of which R, L and flux are known.
     pub(super) fn new(params: &Params) -> Self {
         let get = |id| params.get(id);
         let supply_v = get(ParamId::LimBusVMax);
         let flux_wb = 1e-3 * get(ParamId::MotFluxMwb);
         let fast = match params.choice() {
             CtlMode::Speed => {
-                let turns_hz = get(ParamId::MotPolePairs) * get(ParamId::CtlRpmMax) / 60.0;
+                let turns_hz = params.pole_pairs() * get(ParamId::CtlRpmMax) / 60.0;
                 TURN_PERIODS * turns_hz
             }
             CtlMode::Torque | CtlMode::Voltage => {
