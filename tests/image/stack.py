@@ -37,7 +37,7 @@ def lost_vectors(calls: Calls) -> list[str]:
     image = calls.image
     table = next(s for s in image.sections if s.name == ".vector_table")
     copied = image.symbols["__ram_vectors_end"] - image.symbols["__ram_vectors"]
-    default = image.symbols["DefaultHandler"] & ~1
+    default = image.symbols.get("DefaultHandler", 0) & ~1
     beyond = (image.word(table.begin + at) & ~1 for at in range(copied, table.size, WORD))
     lost = (image.functions.get(target) for target in beyond if target != default)
     return [f"the vector of {f.name} is not copied to RAM: see _ram_vectors" for f in lost if f]
