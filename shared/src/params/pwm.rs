@@ -14,8 +14,11 @@ const TURN_PERIODS: f32 = 20.0;
 /// enough for the control's numbers.
 const QUIET_HZ: f32 = 24_000.0;
 
+/// Highest frequency that follows, Hz: the highest of field-oriented control on the first board.
+const HIGHEST_HZ: f32 = 54_000.0;
+
 /// Frequency while the motor is not known, Hz: the highest of six-step on the first board.
-const UNKNOWN_HZ: f32 = 44_000.0;
+const UNKNOWN_HZ: f32 = 42_000.0;
 
 /// Lowest supply in units of voltage, where the range of the modulator's reciprocal ends.
 pub(super) const BUS_UNITS_MIN: f32 = 0.125;
@@ -74,17 +77,17 @@ impl Pwm {
 
     /// Returns the frequency, without the bounds of the parameter's range.
     pub(super) fn hz(&self) -> f32 {
-        self.fast.max(QUIET_HZ).min(self.most)
+        self.fast.max(QUIET_HZ).min(HIGHEST_HZ).min(self.most)
     }
 
     /// Returns what it follows from.
     pub(super) fn from(&self) -> &'static str {
         if self.hz() == self.most {
             "as high as flux and LIM_BUS_V_MAX allow"
-        } else if self.hz() == self.fast {
-            "enough periods a turn at full speed"
-        } else {
+        } else if self.hz() == QUIET_HZ {
             "nobody hears it"
+        } else {
+            "enough periods a turn at full speed, as far as there are"
         }
     }
 }
@@ -113,13 +116,15 @@ mod tests {
         for (max_rpm, hz) in [
             (10_000.0, 24_000.0),
             (18_000.0, 42_000.0),
-            (60_000.0, 60_000.0),
+            (60_000.0, 54_000.0),
         ] {
             assert_eq!(in_force(&[(ParamId::CtlRpmMax, max_rpm)]), hz);
         }
         // In voltage mode by the supply: 20 V/(√3·2π·0.3215 mWb) is 5716 Hz.
         let voltage = [CtlMode::Voltage.setting(), (ParamId::CtlRpmMax, 10_000.0)];
-        assert!((in_force(&voltage) - 57_163.0).abs() < 10.0);
+        assert_eq!(in_force(&voltage), 54_000.0);
+        let slower = [voltage[0], (ParamId::MotFluxMwb, 0.643)];
+        assert!((in_force(&slower) - 28_581.0).abs() < 10.0);
         assert_eq!(
             in_force(&[(ParamId::PwmFreqHz, 30_000.0), voltage[0]]),
             30_000.0
