@@ -17,8 +17,9 @@ const QUIET_HZ: f32 = 24_000.0;
 /// Highest frequency that follows, Hz: the highest of field-oriented control on the first board.
 const HIGHEST_HZ: f32 = 54_000.0;
 
-/// Frequency while the motor is not known, Hz: the highest of six-step on the first board.
-const UNKNOWN_HZ: f32 = 42_000.0;
+/// Frequency while the motor is not known, Hz. With a higher one the dead times would leave too little of an idling
+/// throttle for some motors to start.
+const UNKNOWN_HZ: f32 = QUIET_HZ;
 
 /// Lowest supply in units of voltage, where the range of the modulator's reciprocal ends.
 pub(super) const BUS_UNITS_MIN: f32 = 0.125;

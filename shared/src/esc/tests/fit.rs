@@ -153,9 +153,8 @@ fn a_restart_with_what_does_not_fit_keeps_the_values_and_the_motor_off() {
     bench.frames(10, 0);
     assert!(bench.may_turn());
     assert_eq!(bench.get(ParamId::MotPolePairs), 11.0);
-    // The factory's, with which it powered up.
     let hz = 1.0 / bench.config().scale.period_s;
-    assert!((hz - 42_000.0).abs() < 1.0, "{hz}");
+    assert!((hz - 24_000.0).abs() < 1.0, "{hz}");
 }
 
 /// It may be a fraction.
