@@ -89,7 +89,7 @@ const LATE_LOOK_EIGHTHS: u32 = 144;
 const FRAME_APART_EIGHTHS: u32 = 16;
 
 /// Usual time from the alarm to the look, which then waits for the last edge.
-const WAKING_US: u32 = 9;
+const WAKING_US: u32 = 8;
 
 /// The task's own state, besides that of replies.
 pub(crate) struct Listener {
