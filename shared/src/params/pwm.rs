@@ -77,6 +77,10 @@ impl Pwm {
     }
 
     /// Returns the frequency, without the bounds of the parameter's range.
+    #[expect(
+        clippy::manual_clamp,
+        reason = "clamp would keep NaN, which these turn into a frequency"
+    )]
     pub(super) fn hz(&self) -> f32 {
         self.fast.max(QUIET_HZ).min(HIGHEST_HZ).min(self.most)
     }
