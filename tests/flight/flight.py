@@ -5,9 +5,10 @@ import struct
 
 from betaflight import Betaflight
 from body import Body
-from judge import STEP_NS
 from plan import Plan
 from quadrotor import Quadrotor, value_of
+
+STEP_NS = 1_000_000
 
 
 def sensors(body: Body) -> list[float]:

@@ -3,9 +3,8 @@
 import bisect
 
 import dshot
-
-STEP_NS = 1_000_000
-"""Between two rows of a flight."""
+from flight import STEP_NS
+from plan import Plan
 
 POLE_PAIRS = 7
 LISTENS_S = 0.1
@@ -36,7 +35,7 @@ class Verdict:
         return "\n".join(lines)
 
 
-def judge(plan, rows: list[dict], escs: list, summary: list[dict]) -> Verdict:
+def judge(plan: Plan, rows: list[dict], escs: list, summary: list[dict]) -> Verdict:
     """Judges a flight: its rows, what was seen of the ESCs, and the emulator's final summary of them."""
     verdict = Verdict()
     plan.judge(verdict, rows)
@@ -69,7 +68,7 @@ def level(verdict: Verdict, name: str, rows: list[dict]) -> None:
     verdict.at_most(f"speeds apart in the {name}", 100 * apart, 2.0, " %")
 
 
-def wire(verdict: Verdict, name: str, plan, rows: list[dict], index: int, esc) -> None:
+def wire(verdict: Verdict, name: str, plan: Plan, rows: list[dict], index: int, esc) -> None:
     """Judges an ESC's replies, decoded here and not by what sent them."""
     # At first it has yet to detect its wire's signal; and the reply to a frame just before the end comes after it.
     sent = between_times(esc.sent, LISTENS_S * 1e9, rows[-1]["s"] * 1e9 - REPLY_NS)

@@ -1,12 +1,9 @@
 """What a pilot flies, and what happens to him: the base of the plans, in which nothing happens."""
 
 from body import Body
+from quadrotor import CALM, PACK
 
 LOW, HIGH = 1000, 2000
-
-CALM = (0.0, 0.0, 0.0)
-PACK = (16.2, 0.016)
-"""Four cells, nearly full: voltage without load, and resistance in ohm."""
 
 
 class Pilot:
@@ -91,9 +88,13 @@ class Plan:
         """Returns whether the wire to this ESC is broken."""
         return False
 
+    def spans(self) -> list[tuple[str, float, float]]:
+        """Returns what goes on, from when to when; of two at a time the first counts."""
+        return []
+
     def event(self, now_s: float) -> str:
         """Returns what is going on at this time, for a picture."""
-        return ""
+        return next((name for name, begin, end in self.spans() if begin <= now_s < end), "")
 
     def breaks(self, now_s: float) -> bool:
         """Returns whether a propeller is struck, or a wire silent."""

@@ -2,10 +2,10 @@
 
 import math
 
-import paths  # noqa: F401  (the folder of the tests' Python)
 from full_throttle import Plant, plant_of
 from judge import Verdict, between, level
-from plan import PACK, Pilot, Plan
+from plan import Pilot, Plan
+from quadrotor import PACK
 from thrust import bench
 
 BENCH = "quad-5-inch"
@@ -64,13 +64,12 @@ class Punch(Plan):
     def pack(self, now_s: float) -> tuple[float, float]:
         return PACK if now_s < self.EMPTY_S else self.EMPTY
 
-    def event(self, now_s: float) -> str:
-        spans = [
+    def spans(self) -> list[tuple[str, float, float]]:
+        return [
             ("punch", *self.PUNCH),
             ("disarmed", *self.CUT),
             ("sag", *self.SAG),
         ]
-        return next((name for name, begin, end in spans if begin <= now_s < end), "")
 
     def judge(self, verdict: Verdict, rows: list[dict]) -> None:
         verdict.at_most("tilt", max(row["tilt"] for row in rows), 30.0, "°")

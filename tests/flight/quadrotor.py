@@ -3,9 +3,11 @@
 import math
 
 from body import DRAG_LOST, PITCH, Body
-from plan import CALM, PACK
 
 RPM = 30.0 / math.pi
+CALM = (0.0, 0.0, 0.0)
+PACK = (16.2, 0.016)
+"""Four cells, nearly full: voltage without load, and resistance in ohm."""
 UNHURT = (0.0, 0.0, 0.0, 0.0)
 MILL, MILL_FADES = 0.7, 500.0
 """Speed of a propeller in air from behind, over the one that the pitch gives: an estimate. It fades up to this forward

@@ -4,7 +4,8 @@ import math
 
 from body import Body
 from judge import Verdict, between, level
-from plan import CALM, PACK, Plan
+from plan import Plan
+from quadrotor import CALM, PACK
 
 
 class Tour(Plan):
@@ -68,8 +69,8 @@ class Tour(Plan):
     def silent(self, now_s: float, esc: int) -> bool:
         return esc == self.SILENT_ESC and self.SILENT[0] <= now_s < self.SILENT[1]
 
-    def event(self, now_s: float) -> str:
-        spans = [
+    def spans(self) -> list[tuple[str, float, float]]:
+        return [
             ("climb", self.TAKE_OFF_S, self.HOVER[0] - 1.0),
             ("hover", self.HOVER[0] - 1.0, self.HOVER[1]),
             ("roll", self.RIGHT_S, self.LEVEL_S),
@@ -78,7 +79,6 @@ class Tour(Plan):
             ("hover", *self.LAST_HOVER),
             ("descent", self.LAND_S, self.LAND_S + (self.HEIGHT_M - Body.STANDS) / self.SINK_M_S),
         ]
-        return next((name for name, begin, end in spans if begin <= now_s < end), "")
 
     def judge(self, verdict: Verdict, rows: list[dict]) -> None:
         verdict.at_most("tilt", max(row["tilt"] for row in rows), 60.0, "°")
