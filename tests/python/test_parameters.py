@@ -127,7 +127,7 @@ def test_six_step_needs_a_pwm_that_sees_its_crossings(start):
         assert not unfit(esc)
     with start().connect() as esc:
         assert esc.set_param("CTL_DRIVE", 1.0) == 1.0
-        esc.wait("STATUSTEXT", lambda m: m.text.startswith("Motor off: PWM_FREQ_HZ "))
+        esc.wait("STATUSTEXT", lambda m: m.text.startswith("Motor off: PWM_FREQ_HZ 0.000 too few "))
         assert esc.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1) == dialect.MAV_RESULT_DENIED
 
 

@@ -36,7 +36,7 @@ def test_the_image_answers_and_lists_its_parameters(board):
         assert esc.command(REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION) == ACCEPTED
         version = esc.wait("AUTOPILOT_VERSION")
         assert version.uid != 0, "the chip has a number"
-        assert esc.params()["PWM_DEADTIME_NS"] == 750
+        assert esc.params()["PWM_FREQ_HZ"] == 0
 
 
 def test_the_dead_time_from_the_factory_is_the_boards(board):
