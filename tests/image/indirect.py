@@ -23,8 +23,6 @@ LEADS_TO = [
     # MAVLink asks the throttle side and checks a changed parameter through what it is given.
     (r"^siskin_control::mavlink::(component|context|command)::", r" as siskin_control::input::access::Access>::"),
     (r"^siskin_control::mavlink::parameter::change$", r"^siskin_control::esc::Esc::with_component::{closure}$"),
-    # A function that is called often, its address kept in a register: shorter than as many calls.
-    (r"^siskin_control::params::build::build_in$", r"^siskin_control::params::build::si::Si::parts$"),
     # What it hands bytes to is known at link time: the serial line's pipe, which wakes its task.
     (r"^siskin_control::mavlink::sender::Sender::send_payload$", WAKER),
 ]

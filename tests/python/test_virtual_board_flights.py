@@ -1,4 +1,4 @@
-"""What a pilot feels, with the flashed image on the virtual board: a start, full throttle, wind, a sag, a long dead time.
+"""What a pilot feels, with the flashed image on the virtual board: a start, full throttle, wind, a sag.
 
 The same bounds hold in the emulator, whose speeds the image's are compared with.
 """
@@ -36,7 +36,7 @@ PARAMS = {"CTL_MODE": VOLTAGE, "CTL_RPM_MAX": 10_500, "CTL_SLEW_RPM_S": 0, "PWM_
 mode, up to one that is out of reach."""
 EMPTY = {"cells": 4, "capacity_ah": 4.0, "charge": 0.15, "resistance_mohm": 120}
 HALF_WIND = {"at_s": 0.8, "kind": "gust", "value": -4000.0}
-"""0.8 of the speed at half throttle."""
+"""Two thirds of the speed at half throttle."""
 
 FLIGHTS = {
     # 80 % of what it idles at within 0.2 s, and 0.97 of what its pack and limits allow.

@@ -5,7 +5,6 @@
 
 use core::f32::consts::{PI, TAU};
 
-use super::pwm::Pwm;
 #[cfg(doc)]
 use super::table::Kind;
 use super::table::ParamId;
@@ -135,10 +134,6 @@ impl FromMotor {
             "a fifth of STA_RAMP_A's torque over J",
             "12 electrical turns to STA_RUN_RPM",
         ];
-        let of_pwm = match stated.unknown() {
-            Some(_) => "the motor is not known",
-            None => Pwm::new(params).from(),
-        };
         let settings = [
             (
                 ParamId::CtlRpmMin,
@@ -160,7 +155,7 @@ impl FromMotor {
                 self.speed_hz,
                 text(speed, least(speed), of_speed),
             ),
-            (ParamId::PwmFreqHz, motor.pwm_hz, of_pwm),
+            (ParamId::PwmFreqHz, motor.pwm_hz, stated.pwm_from()),
             (ParamId::StaParkAs, self.park_as, "0.4 s of STA_RAMP_A"),
             (ParamId::StaRampA, self.ramp_a, "a fifth of LIM_PHASE_A"),
             (
@@ -175,18 +170,9 @@ impl FromMotor {
             ),
         ];
         settings.map(|(id, value, from)| {
-            // In force it is never 0.
-            let params = if id == ParamId::PwmFreqHz {
-                stated
-            } else {
-                params
-            };
-            let from = if params.get(id) == 0.0 {
-                from
-            } else {
-                "chosen"
-            };
-            (id, value, from)
+            // PWM_FREQ_HZ is never 0 in force, and CTL_RPM_MIN may be 0 only there.
+            let follows = [stated, params].iter().any(|of| of.get(id) == 0.0);
+            (id, value, if follows { from } else { "chosen" })
         })
     }
 }
@@ -281,7 +267,8 @@ pub(super) mod tests {
     use super::*;
     use crate::params::{BOSSO_MOTOR, Kind};
 
-    fn params(values: &[(ParamId, f32)]) -> Params {
+    /// The first paper's motor with these values.
+    pub(in crate::params) fn params(values: &[(ParamId, f32)]) -> Params {
         let mut params = Params::of(&BOSSO_MOTOR);
         for (id, value) in values {
             params.set(*id, *value).expect("in range");

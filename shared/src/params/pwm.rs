@@ -45,10 +45,19 @@ impl Params {
         };
         ParamId::PwmFreqHz.held(hz)
     }
+
+    /// Returns what it follows from where `PWM_FREQ_HZ` is 0.
+    pub(super) fn pwm_from(&self) -> &'static str {
+        if self.unknown().is_some() {
+            "the motor is not known"
+        } else {
+            Pwm::new(self).from()
+        }
+    }
 }
 
 /// Frequencies that follow from a motor, Hz.
-pub(super) struct Pwm {
+struct Pwm {
     /// Enough periods a turn at full speed.
     fast: f32,
     /// The highest that the control's numbers allow.
@@ -57,7 +66,7 @@ pub(super) struct Pwm {
 
 impl Pwm {
     /// Takes the parameters of a motor of which R, L and flux are known.
-    pub(super) fn new(params: &Params) -> Self {
+    fn new(params: &Params) -> Self {
         let get = |id| params.get(id);
         let supply_v = get(ParamId::LimBusVMax);
         let flux_wb = 1e-3 * get(ParamId::MotFluxMwb);
@@ -81,12 +90,12 @@ impl Pwm {
         clippy::manual_clamp,
         reason = "clamp would keep NaN, which these turn into a frequency"
     )]
-    pub(super) fn hz(&self) -> f32 {
+    fn hz(&self) -> f32 {
         self.fast.max(QUIET_HZ).min(HIGHEST_HZ).min(self.most)
     }
 
     /// Returns what it follows from.
-    pub(super) fn from(&self) -> &'static str {
+    fn from(&self) -> &'static str {
         if self.hz() == self.most {
             "as high as flux and LIM_BUS_V_MAX allow"
         } else if self.hz() == QUIET_HZ {
@@ -100,19 +109,14 @@ impl Pwm {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::from_motor::tests::RACING;
-    use crate::params::{BOSSO_MOTOR, Board, build};
+    use crate::params::from_motor::tests::{RACING, params};
+    use crate::params::{Board, build};
 
     fn in_force(values: &[(ParamId, f32)]) -> f32 {
-        let mut params = Params::of(&BOSSO_MOTOR);
-        for (id, value) in RACING
-            .iter()
-            .chain([&(ParamId::PwmFreqHz, 0.0)])
-            .chain(values)
-        {
-            params.set(*id, *value).expect("in range");
-        }
-        params.in_force().get(ParamId::PwmFreqHz)
+        let follows = [(ParamId::PwmFreqHz, 0.0)];
+        params(&[&RACING[..], &follows, values].concat())
+            .in_force()
+            .get(ParamId::PwmFreqHz)
     }
 
     /// 7 pole pairs.
@@ -147,8 +151,7 @@ mod tests {
     /// A gimbal's motor of 140 rpm/V, with 7 pole pairs, at 12 V; its ESC measures up to 2 A.
     #[test]
     fn a_slow_motor_gets_what_the_numbers_allow() {
-        let mut params = Params::of(&BOSSO_MOTOR);
-        for (id, value) in [
+        let mut params = params(&[
             (ParamId::MotPolePairs, 7.0),
             (ParamId::MotFluxMwb, 5.6),
             (ParamId::MotRMohm, 6300.0),
@@ -160,9 +163,7 @@ mod tests {
             (ParamId::CtlRpmMax, 1500.0),
             (ParamId::CtlRpmMin, 0.0),
             (ParamId::PwmFreqHz, 0.0),
-        ] {
-            params.set(id, value).expect("in range");
-        }
+        ]);
         // 0.8·14 V/(π/2·5.6 mWb/8).
         let hz = params.in_force().get(ParamId::PwmFreqHz);
         assert!((hz - 10_186.0).abs() < 10.0, "{hz}");
