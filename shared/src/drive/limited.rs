@@ -2,7 +2,7 @@
 
 use super::snapshot::Snapshot;
 use crate::protection::{Limit, Limits};
-use crate::units::{Current, Voltage};
+use crate::units::{Current, Speed, Voltage};
 
 /// Thresholds at which limits count as active, in the control's units.
 #[derive(Clone, Copy, Debug)]
@@ -14,6 +14,8 @@ pub struct Thresholds {
     pub bus_return_v: Voltage,
     /// Supply voltage below which less is drawn.
     pub bus_draw_v: Voltage,
+    /// Fastest speed that the six-step drive follows; with the other drive the greatest of the type.
+    pub fastest: Speed,
 }
 
 /// A quantity at its bound lies within a sixteenth of it: the regulator's ripple is smaller.
@@ -53,6 +55,11 @@ impl Thresholds {
             Limit::RegenCurrent,
         );
         note(snapshot.bus > self.bus_return_v, Limit::BusVoltage);
+        // Where it is held the speed wavers by a percent.
+        note(
+            snapshot.speed.saturating_abs() >= self.fastest - (self.fastest >> NEAR_SHIFT),
+            Limit::CommutationRate,
+        );
         // The longest voltage without over-modulation is 1/√3 of the supply; 1/2 + 1/16 is 3 % less.
         let bus = snapshot.bus;
         let most = (bus >> 1) + (bus >> NEAR_SHIFT);
@@ -101,6 +108,7 @@ mod tests {
             phase: protection.phase,
             bus_return_v: protection.bus_return_v,
             bus_draw_v: protection.bus_draw_v,
+            fastest: Speed::MAX,
         };
         (thresholds, snapshot)
     }
@@ -148,6 +156,18 @@ mod tests {
         only(thresholds.limits(&snapshot), Some(Limit::Duty));
         snapshot.bus = thresholds.bus_return_v + Voltage::DELTA;
         only(thresholds.limits(&snapshot), Some(Limit::BusVoltage));
+    }
+
+    #[test]
+    fn a_motor_at_the_fastest_speed_that_six_step_follows_is_held() {
+        for (share, wanted) in [(0.9, None), (0.97, Some(Limit::CommutationRate))] {
+            let (mut thresholds, mut snapshot) = at(0.0, 0.5);
+            thresholds.fastest = Speed::from_num(0.05);
+            for direction in [1.0, -1.0] {
+                snapshot.speed = Speed::from_num(0.05 * share * direction);
+                only(thresholds.limits(&snapshot), wanted);
+            }
+        }
     }
 
     /// A bound of zero binds too: the motor is asked to turn, and the supply does not let it.

@@ -278,6 +278,11 @@ impl Applied {
         self.unreadable == UNREADABLE
     }
 
+    /// Returns true while duties are to be recorded.
+    pub(super) fn may_matter(&self) -> bool {
+        self.unreadable != 0
+    }
+
     /// Notes that the next command may leave a phase unreadable.
     pub(super) fn expect_unreadable(&mut self) {
         if self.unreadable == 0 {

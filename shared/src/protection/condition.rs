@@ -179,7 +179,7 @@ conditions! {
     /// A limit that the drive respects at the cost of the demand, or a defect that it continues with.
     Limit,
     /// A set of limits.
-    Limits of 9 from 16 in u16,
+    Limits of 10 from 16 in u16,
     /// The bit of extended telemetry's status that it raises.
     raises: Option<Raised>;
 
@@ -219,6 +219,10 @@ conditions! {
     SupplySag = 24 "supply sag" Some(Raised::Alert),
         "the supply is less than 8 %, or 0.31 V if that is more, above `LIM_BUS_V_MIN`"
         "draws less: there is no more torque, and none at all just above `LIM_BUS_V_MIN`";
+    /// The six-step drive's samples follow no faster motor.
+    CommutationRate = 25 "commutation rate" Some(Raised::Alert),
+        "in six-step the motor is as fast as the samples can follow, a turn of its poles in 21 periods of `PWM_FREQ_HZ`"
+        "holds the speed there: identify the motor, or raise `PWM_FREQ_HZ`";
 }
 
 impl Fault {

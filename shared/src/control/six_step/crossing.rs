@@ -6,6 +6,9 @@
 //! sample. Below a diode's drop the terminal is clamped, so only the positive side has a value, and the crossing's
 //! instant is extrapolated from it.
 //!
+//! At full duty the switching leg is never low. The star point is then at half of the supply, and the terminal shows its
+//! back-EMF on both sides of the crossing.
+//!
 //! After a commutation the released phase's current freewheels through a diode until it has decayed. From a leg
 //! that was low it takes the terminal to the supply, above any back-EMF, so such a reading is ignored. From a leg
 //! that switched it takes the terminal to ground, which looks like a crossing, so a falling phase must have been
@@ -38,10 +41,10 @@ traced! {
         pub side: bool,
         /// Consecutive readings on that side.
         pub run: u16,
-        /// The phase rises and has certainly been below the threshold.
-        pub below: bool,
-        /// The first and last readings above the threshold.
-        pub above: Option<Span>,
+        /// The last sample at which a rising phase was certainly below the threshold; 0 if it never was.
+        pub below: u16,
+        /// The first and last readings that tell how far the crossing is.
+        pub seen: Option<Span>,
         /// The crossing has been found.
         pub found: bool,
         /// Change of the reading per period near the crossing, from earlier sextants; 0 while unknown.
@@ -53,17 +56,38 @@ traced! {
     /// Two readings of one sextant.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Span {
-        /// Sample number and value of the first.
+        /// Sample number and value of the first; values count from the crossing, negative before it.
         pub first: (u16, Voltage),
         /// Sample number and value of the last.
         pub last: (u16, Voltage),
     }
 }
 
+/// Where the switching leg was at the sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Leg {
+    /// At ground, as in every period in which it switches.
+    Low,
+    /// At the supply for the whole period.
+    High,
+    /// On its way: what the terminal shows depends on the sample's exact time.
+    Changes,
+}
+
+/// log2 of the supply over the distance from a rail within which a terminal may be held by a diode.
+const RAIL_SHIFT: u32 = 4;
+
 impl State {
     /// Returns true if no reading of this sextant was usable: the released phase's current has not decayed.
     pub fn blind(&self) -> bool {
-        !self.below && self.above.is_none()
+        self.below == 0 && self.seen.is_none()
+    }
+
+    /// Returns how many periods ago the crossing was, negative if it is still to come, by a reading before it.
+    pub fn expected(&self) -> Option<I16F16> {
+        let (at, reading) = self.seen?.last;
+        let to_come = (self.slope > Voltage::ZERO).then(|| periods(reading, self.slope))?;
+        Some(whole(self.samples - at).minus(to_come.min(whole(self.samples))))
     }
 
     /// Begins the next sextant.
@@ -75,15 +99,15 @@ impl State {
         };
     }
 
-    fn see(&mut self, terminal: Voltage) {
-        let now = (self.samples, terminal);
-        let first = self.above.map_or(now, |span| span.first);
-        self.above = Some(Span { first, last: now });
+    fn see(&mut self, reading: Voltage) {
+        let now = (self.samples, reading);
+        let first = self.seen.map_or(now, |span| span.first);
+        self.seen = Some(Span { first, last: now });
     }
 
     /// Returns the measured slope if the reading has changed well beyond ADC steps and noise.
     fn measured_slope(&self, config: &Config) -> Option<Voltage> {
-        let Span { first, last } = self.above?;
+        let Span { first, last } = self.seen?;
         let samples = i32::from(last.0 - first.0);
         let change = last.1.minus(first.1).saturating_abs();
         if change < config.least.saturating_mul_int(2) {
@@ -107,11 +131,16 @@ pub fn look(
     strict: bool,
     certain: u16,
     terminal: Voltage,
-    bus: Voltage,
+    (leg, bus): (Leg, Voltage),
 ) -> Option<I16F16> {
     state.samples = state.samples.saturating_add(1);
     if state.samples <= config.delayed {
         return None;
+    }
+    match leg {
+        Leg::Low => {}
+        Leg::High => return look_while_high(config, state, rising, terminal, bus),
+        Leg::Changes => return None,
     }
     // Line to line, a driven motor's back-EMF is below the supply: 1.5 times a phase's at 30° from its crossing is
     // 0.43 of that, at 60° 0.75.
@@ -133,17 +162,49 @@ pub fn look(
         if above {
             rising_above(state, strict, certain, terminal)
         } else {
-            state.below |= !state.found;
+            if !state.found {
+                state.below = state.samples;
+            }
             None
         }
     } else if state.found {
         None
     } else if above {
-        state.see(terminal);
+        state.see(terminal.saturating_neg());
         None
     } else {
         falling_below(state)
     }
+}
+
+/// Processes a sample that was taken while the switching leg was at the supply. The star point is at half of it, and a
+/// terminal shows its back-EMF on both sides of that: where the released phase's current has hidden the crossing, the
+/// first reading after it still tells when it was.
+fn look_while_high(
+    config: &Config,
+    state: &mut State,
+    rising: bool,
+    terminal: Voltage,
+    bus: Voltage,
+) -> Option<I16F16> {
+    // A terminal at a rail carries current, whatever its back-EMF.
+    let margin = bus >> RAIL_SHIFT;
+    if terminal <= margin || terminal >= bus.minus(margin).min(config.greatest) {
+        return None;
+    }
+    let reading = terminal.minus(bus >> 1);
+    let past = if rising {
+        reading
+    } else {
+        reading.saturating_neg()
+    };
+    let before = state.seen.map_or(0, |span| span.last.0);
+    state.see(past);
+    if state.found || past < config.least {
+        return None;
+    }
+    state.found = true;
+    Some(periods(past, state.slope).min(whole(state.samples - before)))
 }
 
 fn rising_above(
@@ -152,7 +213,7 @@ fn rising_above(
     certain: u16,
     terminal: Voltage,
 ) -> Option<I16F16> {
-    if strict && !state.below {
+    if strict && state.below == 0 {
         return None;
     }
     state.see(terminal);
@@ -160,18 +221,18 @@ fn rising_above(
         return None;
     }
     state.found = true;
-    // The reading has grown from zero since the crossing, which was within this sextant.
+    // The reading has grown from zero since the crossing, which was within this sextant, and after a reading below.
     let grows = periods(terminal, state.slope).max(whole(certain - 1));
-    Some(grows.min(whole(state.samples)))
+    Some(grows.min(whole(state.samples - state.below)))
 }
 
 fn falling_below(state: &mut State) -> Option<I16F16> {
-    let (at, reading) = state.above?.last;
+    let (at, reading) = state.seen?.last;
     state.found = true;
     // The crossing came this much later than the last reading; a slow rotor still falls a while below the
     // threshold.
     let falls = periods(reading, state.slope).min(whole(state.samples / 2));
-    Some(whole(state.samples - at).minus(falls))
+    Some(whole(state.samples - at).minus(falls).max(I16F16::ZERO))
 }
 
 fn whole(samples: u16) -> I16F16 {
@@ -180,7 +241,8 @@ fn whole(samples: u16) -> I16F16 {
 
 /// Returns the time in which a reading grows by this slope; zero if the slope is unknown.
 fn periods(reading: Voltage, slope: Voltage) -> I16F16 {
-    if reading <= Voltage::ZERO || slope <= Voltage::ZERO {
+    let reading = reading.saturating_abs();
+    if slope <= Voltage::ZERO {
         return I16F16::ZERO;
     }
     let quotient = divide((reading.to_bits() as u64) << 16, slope.to_bits() as u32);
@@ -239,7 +301,7 @@ mod tests {
                 terminal(emf_v)
             };
             let bus = Voltage::from_num(BUS_V / BASE_V);
-            if let Some(age) = look(&config, state, rising, false, 1, reading, bus) {
+            if let Some(age) = look(&config, state, rising, false, 1, reading, (Leg::Low, bus)) {
                 assert!(error.is_none(), "once a sextant");
                 error = Some(t - age.to_num::<f64>() - sextant_periods / 2.0);
             }
@@ -301,12 +363,39 @@ mod tests {
         let mut state = State::default();
         for _ in 0..10 {
             assert_eq!(
-                look(&config, &mut state, true, true, 1, terminal(1.0), bus),
+                look(
+                    &config,
+                    &mut state,
+                    true,
+                    true,
+                    1,
+                    terminal(1.0),
+                    (Leg::Low, bus)
+                ),
                 None
             );
         }
-        look(&config, &mut state, true, true, 1, terminal(-0.1), bus);
-        assert!(look(&config, &mut state, true, true, 1, terminal(0.1), bus).is_some());
+        look(
+            &config,
+            &mut state,
+            true,
+            true,
+            1,
+            terminal(-0.1),
+            (Leg::Low, bus),
+        );
+        assert!(
+            look(
+                &config,
+                &mut state,
+                true,
+                true,
+                1,
+                terminal(0.1),
+                (Leg::Low, bus)
+            )
+            .is_some()
+        );
     }
 
     #[test]
@@ -319,10 +408,118 @@ mod tests {
                 // Noise of up to three counts.
                 let reading = terminal(COUNT_V / 1.5 * f64::from(i * 7 % 11 % 4));
                 assert_eq!(
-                    look(&config, &mut state, rising, true, 4, reading, bus),
+                    look(
+                        &config,
+                        &mut state,
+                        rising,
+                        true,
+                        4,
+                        reading,
+                        (Leg::Low, bus)
+                    ),
                     None
                 );
             }
         }
+    }
+
+    /// The terminal's reading while the switching leg is at the supply.
+    fn beside_the_supply(emf_v: f64) -> Voltage {
+        terminal((BUS_V / 2.0 + 1.5 * emf_v) / 1.5)
+    }
+
+    #[test]
+    fn at_full_duty_a_crossing_that_was_hidden_is_found_by_the_slope() {
+        let bus = Voltage::from_num(BUS_V / BASE_V);
+        for sign in [1.0, -1.0] {
+            let mut state = State {
+                slope: Voltage::from_num(1.5 * 2.0 / BASE_V),
+                ..State::default()
+            };
+            let mut see = |reading| {
+                look(
+                    &config(),
+                    &mut state,
+                    sign > 0.0,
+                    false,
+                    1,
+                    reading,
+                    (Leg::High, bus),
+                )
+            };
+            // The previous sextant's, then a diode's at either rail; the crossing is a period and a half past.
+            for rail_v in [10.0, -100.0, 100.0] {
+                assert_eq!(see(terminal(rail_v)), None);
+            }
+            let age = see(beside_the_supply(sign * 3.0)).expect("past the crossing");
+            assert!((age.to_num::<f64>() - 1.5).abs() < 0.02, "{age}");
+            assert_eq!(see(beside_the_supply(sign * 5.0)), None, "once");
+        }
+    }
+
+    #[test]
+    fn a_crossing_to_come_is_expected_by_the_slope() {
+        let bus = Voltage::from_num(BUS_V / BASE_V);
+        let mut state = State {
+            slope: Voltage::from_num(1.5 * 2.0 / BASE_V),
+            ..State::default()
+        };
+        assert_eq!(state.expected(), None);
+        for reading in [terminal(10.0), beside_the_supply(-4.0)] {
+            look(
+                &config(),
+                &mut state,
+                true,
+                false,
+                1,
+                reading,
+                (Leg::High, bus),
+            );
+        }
+        let age = state.expected().expect("seen").to_num::<f64>();
+        assert!((age + 2.0).abs() < 0.02, "{age}");
+    }
+
+    #[test]
+    fn a_sample_between_two_kinds_of_periods_tells_nothing() {
+        let (bus, mut state) = (Voltage::from_num(BUS_V / BASE_V), State::default());
+        for _ in 0..8 {
+            let found = look(
+                &config(),
+                &mut state,
+                true,
+                false,
+                1,
+                terminal(3.0),
+                (Leg::Changes, bus),
+            );
+            assert_eq!(found, None);
+        }
+        assert!(state.blind());
+    }
+
+    #[test]
+    fn a_crossing_is_after_the_last_reading_before_it_whatever_the_slope_was() {
+        // A slope from a tenth of the speed.
+        let bus = Voltage::from_num(BUS_V / BASE_V);
+        let mut state = State {
+            slope: Voltage::from_num(0.02 / BASE_V),
+            ..State::default()
+        };
+        let mut see = |emf_v| {
+            look(
+                &config(),
+                &mut state,
+                true,
+                false,
+                1,
+                terminal(emf_v),
+                (Leg::Low, bus),
+            )
+        };
+        for emf_v in [10.0, -3.0, -1.0] {
+            assert_eq!(see(emf_v), None);
+        }
+        assert_eq!(see(1.0), Some(I16F16::ONE));
     }
 }

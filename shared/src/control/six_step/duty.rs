@@ -26,16 +26,25 @@ pub struct Config {
     pub k_b: Gain<Current, I1F31>,
     /// Greatest lead towards zero current, so that the current lost at a commutation is not taken for a trend.
     pub lead_to_zero_max: Current,
-    /// Largest duty; the remainder is the low-side on-time in which the sample falls.
+    /// Largest duty of a leg that switches; the remainder is the low-side on-time in which the sample falls.
     pub duty_max: I1F31,
+    /// What is left to the whole period.
+    pub rest: I1F31,
 }
+
+/// The whole period.
+pub const WHOLE: I1F31 = I1F31::MAX;
 
 traced! {
     /// The loop's state.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
-        /// The previous period's duty, 0 to `duty_max`.
+        /// The previous period's duty, 0 to [`WHOLE`]. Beyond `duty_max` it is a mean.
         pub duty: I1F31,
+        /// The leg stays at the supply.
+        pub stays_high: bool,
+        /// What has been made too little of the duty beyond `duty_max`.
+        pub owed: I1F31,
         /// The speed regulator's integral.
         pub sigma: I1F31,
         /// The current after a low-pass of eight periods.
@@ -64,8 +73,28 @@ impl State {
     }
 
     /// Returns the duty for the bridge.
-    pub fn for_bridge(&self) -> Duty {
-        Duty::from_bits(self.duty.max(I1F31::ZERO).to_bits() as u32)
+    pub fn for_bridge(&self, config: &Config) -> Duty {
+        if self.stays_high {
+            return Duty::MAX;
+        }
+        Duty::from_bits(self.duty.min(config.duty_max).max(I1F31::ZERO).to_bits() as u32)
+    }
+
+    /// Returns the duty beyond the largest of a leg that switches.
+    pub fn beyond(&self, config: &Config) -> I1F31 {
+        self.duty.max(config.duty_max) - config.duty_max
+    }
+
+    /// Chooses for the next two periods or more: where the duty is beyond that of a leg that switches, the leg stays high
+    /// as often as makes it in the mean. A sample between two periods of one kind is of use.
+    pub fn choose(&mut self, config: &Config) {
+        let owed = self.owed.saturating_add(self.beyond(config));
+        self.stays_high = owed >= config.rest;
+        self.owed = if self.stays_high {
+            owed - config.rest
+        } else {
+            owed
+        };
     }
 }
 
@@ -77,7 +106,9 @@ impl State {
 /// on the current's own side, the lead towards zero is limited: where the inductance is low, a commutation takes half
 /// of the current within a period. The current recovers by itself, and a duty that moved against the loss would drive
 /// it far beyond that bound. Towards the other bound all of the lead counts, as the current may be on its way there.
-pub fn range(config: &Config, state: &mut State, i: Current, bounds: Bounds) -> Range {
+///
+/// The duty is at most `most`.
+pub fn range(config: &Config, state: &mut State, i: Current, bounds: Bounds, most: I1F31) -> Range {
     let deviation = i.minus(state.smoothed);
     state.smoothed = state.smoothed.plus(deviation >> 3);
     let forgotten = state.peak >> PEAK_SHIFT;
@@ -92,7 +123,7 @@ pub fn range(config: &Config, state: &mut State, i: Current, bounds: Bounds) -> 
     let limit = |bound: Current, lead: Current| {
         let step = config.k_b.held(bound.minus(i).minus(lead));
         let duty = state.duty.plus(step);
-        duty.max(I1F31::ZERO).min(config.duty_max)
+        duty.max(I1F31::ZERO).min(most)
     };
     let mut least = limit(bounds.min, for_least);
     let mut greatest = limit(bounds.max, for_greatest);
@@ -106,8 +137,9 @@ pub fn range(config: &Config, state: &mut State, i: Current, bounds: Bounds) -> 
 }
 
 /// Moves to this share of the supply as far as the range permits.
-pub fn share(state: &mut State, share: I1F31, range: Range) {
+pub fn share(config: &Config, state: &mut State, share: I1F31, range: Range) {
     state.duty = share.min(range.greatest).max(range.least);
+    state.stays_high &= state.duty > config.duty_max;
 }
 
 /// Regulates the speed: returns the wanted duty. `error` is wanted minus actual speed, and `before` the duty that was wanted
@@ -118,7 +150,7 @@ pub fn speed(config: &Config, state: &mut State, (error, before): (Speed, I1F31)
     let wanted = state.sigma.plus(config.k_p.held(error));
     if !(held_below || held_above) {
         let sigma = state.sigma.plus(config.k_i.held(error));
-        state.sigma = sigma.max(I1F31::ZERO).min(config.duty_max);
+        state.sigma = sigma.max(I1F31::ZERO).min(WHOLE);
     }
     wanted
 }
@@ -134,6 +166,9 @@ mod tests {
 
     const LIMIT_A: f64 = 20.0;
 
+    /// Largest duty of a leg that switches.
+    const MOST: I1F31 = I1F31::lit("0.92");
+
     /// Gains for a bound of 20 A at 40 kHz and a full speed of 0.03 turns per period.
     fn config() -> Config {
         Config {
@@ -141,7 +176,8 @@ mod tests {
             k_i: Gain::new(5e-4 / 0.03).expect("in range"),
             k_b: Gain::new(0.008).expect("in range"),
             lead_to_zero_max: amperes(LIMIT_A / 4.0),
-            duty_max: I1F31::from_num(0.92),
+            duty_max: MOST,
+            rest: WHOLE - MOST,
         }
     }
 
@@ -182,8 +218,8 @@ mod tests {
             wanted: I1F31,
             bounds: Bounds,
         ) {
-            let range = range(config, state, amperes(self.i_a), bounds);
-            share(state, wanted, range);
+            let range = range(config, state, amperes(self.i_a), bounds, MOST);
+            share(config, state, wanted, range);
             self.period(state.duty);
         }
     }
@@ -266,7 +302,7 @@ mod tests {
                         ..State::default()
                     };
                     let bounds = bounds(min_a, max_a);
-                    let range = range(&config(), &mut state, amperes(now_a), bounds);
+                    let range = range(&config(), &mut state, amperes(now_a), bounds, MOST);
                     let what = (min_a, before_a, now_a, duty);
                     assert!(range.least <= range.greatest, "{what:?}");
                     assert!(range.least == range.greatest || min_a < max_a, "{what:?}");
@@ -289,8 +325,8 @@ mod tests {
         for wanted_a in [4.0, -5.0, 0.0] {
             for _ in 0..4000 {
                 let bounds = bounds(wanted_a, wanted_a);
-                let range = range(&config, &mut state, amperes(winding.i_a), bounds);
-                share(&mut state, range.greatest, range);
+                let range = range(&config, &mut state, amperes(winding.i_a), bounds, MOST);
+                share(&config, &mut state, range.greatest, range);
                 winding.period(state.duty);
             }
             assert!((winding.i_a - wanted_a).abs() < 0.05, "{}", winding.i_a);
@@ -343,10 +379,16 @@ mod tests {
         let mut most = 0.0_f64;
         let (wanted_speed, mut wanted) = (0.02, I1F31::ZERO);
         for _ in 0..40_000 {
-            let range = range(&config, &mut state, amperes(current_a), bounds(-5.0, 20.0));
+            let range = range(
+                &config,
+                &mut state,
+                amperes(current_a),
+                bounds(-5.0, 20.0),
+                MOST,
+            );
             let error = Speed::from_num(wanted_speed - speed_now);
             wanted = speed(&config, &mut state, (error, wanted));
-            share(&mut state, wanted, range);
+            share(&config, &mut state, wanted, range);
             let across_v = state.duty.to_num::<f64>() * 24.0 - speed_now / 0.0444 * 24.0;
             current_a = across_v / 0.216;
             speed_now += current_a * 0.216 / 24.0 * 0.0444 * 25e-6 / 0.046;
@@ -357,5 +399,37 @@ mod tests {
             "{speed_now}"
         );
         assert!(most < 1.1 * wanted_speed, "{most}");
+    }
+
+    #[test]
+    fn a_leg_stays_high_as_often_as_makes_the_duty() {
+        for wanted in [0.5, 0.93, 0.96, 0.99] {
+            let mut state = State {
+                duty: I1F31::from_num(wanted),
+                ..State::default()
+            };
+            let mut sum = 0.0;
+            for _ in 0..1000 {
+                state.choose(&config());
+                sum += (state.for_bridge(&config()).to_num::<f64>()).min(1.0);
+            }
+            assert!((sum / 1000.0 - wanted).abs() < 2e-4, "{wanted}: {sum}");
+        }
+    }
+
+    #[test]
+    fn a_leg_switches_as_soon_as_the_duty_lets_it() {
+        let mut state = State {
+            duty: WHOLE,
+            ..State::default()
+        };
+        state.choose(&config());
+        assert!(state.stays_high);
+        let range = Range {
+            least: I1F31::ZERO,
+            greatest: I1F31::from_num(0.91),
+        };
+        share(&config(), &mut state, WHOLE, range);
+        assert!(!state.stays_high);
     }
 }

@@ -36,6 +36,10 @@ traced! {
 /// At least three periods per sextant: with fewer no reading is left between the decaying current and the crossing.
 pub const FASTEST: Speed = Speed::from_bits(SEXTANT.to_bits() / 3);
 
+/// Speed from which a sextant has fewer than five periods: a crossing's instant, known to a fraction of a period, is then
+/// only a part of what tells the rotor's angle and speed.
+pub const FEW_PERIODS: Speed = Speed::from_bits(SEXTANT.to_bits() / 5);
+
 impl State {
     /// Creates the state of a rotor at rest, anywhere.
     pub fn at_rest() -> Self {
@@ -79,6 +83,9 @@ impl State {
                 self.omega += mean.minus(self.omega) >> 1;
             }
             self.omega_bar = self.omega;
+        } else if self.omega >= FEW_PERIODS {
+            self.omega += mean.minus(self.omega) >> 3;
+            self.omega_bar = self.omega;
         } else {
             self.omega += mean.minus(self.omega) >> 1;
             self.omega_bar += mean.minus(self.omega_bar) >> 2;
@@ -88,7 +95,12 @@ impl State {
             // It may be faster than the long interval suggests: better early than late.
             HALF_SEXTANT
         } else {
-            bounded(times(self.omega, age))
+            let measured = bounded(times(self.omega, age));
+            if self.is_known() && self.omega >= FEW_PERIODS {
+                self.delta.plus(measured.minus(self.delta) >> 1)
+            } else {
+                measured
+            }
         };
         self.elapsed = age;
         self.sextants = 0;

@@ -1,10 +1,12 @@
 //! Coefficients of the six-step drive.
 
+use fixed::types::I1F31;
+
 use crate::control::delay::Delay;
 use crate::control::planner;
 use crate::control::six_step::{crossing, duty};
 use crate::math::Gain;
-use crate::units::{AdcCounts, Current, Speed, Voltage};
+use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
 
 /// Consecutive sextants without a crossing after which the rotor is lost: two turns.
 pub(crate) const LOST_SEXTANTS: u8 = 12;
@@ -23,6 +25,16 @@ pub struct Config {
     pub planner: planner::Config,
     /// The outer loop.
     pub duty: duty::Config,
+    /// Largest duty at speed.
+    pub whole: I1F31,
+    /// Speed from which a leg may stay at the supply.
+    pub whole_from: Speed,
+    /// Speed at which the duty is held: the fastest that the samples follow.
+    pub fastest: Speed,
+    /// From what is left to that speed to the largest duty.
+    pub hold: Gain<Speed, I1F31>,
+    /// From the duty beyond that of a leg that switches to the commutation's advance.
+    pub advance: Gain<I1F31, Angle>,
     /// From the sample to the commutation it leads to.
     pub delay: Delay,
     /// Largest current against the rotation. While braking, a released phase's back-EMF sustains

@@ -85,8 +85,8 @@ pub(super) fn most(s: &State, shared: &Shared) -> Current {
 
 /// Computes the duty in Run and Stopping.
 pub(super) fn run(six_step: &Config, s: &mut State, i: Current) {
-    let range = duty::range(&six_step.duty, &mut s.duty, i, s.bounds);
-    duty::share(&mut s.duty, s.wanted, range);
+    let range = duty::range(&six_step.duty, &mut s.duty, i, s.bounds, s.most);
+    duty::share(&six_step.duty, &mut s.duty, s.wanted, range);
 }
 
 /// Computes the wanted duty and the current's bounds in Run and Stopping.
@@ -103,6 +103,7 @@ pub(super) fn plan(
         max: most(s, shared),
     };
     let speed = s.tracking.omega_bar;
+    s.most = most_duty(six_step, s);
     let demand = demand(setpoint, shared.reversed);
     let mut slowest = speed;
     let (bounds, present, wanted) = match demand {
@@ -143,10 +144,37 @@ pub(super) fn plan(
     duty::take_over(&mut s.duty);
 }
 
-/// Returns a share of the supply as a duty.
-fn duty_of(six_step: &Config, share: I1F31) -> I1F31 {
-    I1F31::from_bits(share.top(six_step.duty.duty_max).to_bits() << 1)
+/// log2 of the time constant, in periods of the outer loop, with which the duty settles that holds the fastest speed: 9 to
+/// 21 ms.
+const HOLD_SHIFT: u32 = 6;
+
+/// Returns the largest duty: the whole where the motor is fast enough for its high sides' drivers, and less where it
+/// would become too fast for the samples.
+fn most_duty(six_step: &Config, s: &mut State) -> I1F31 {
+    let speed = s.tracking.omega_bar;
+    if !s.tracking.is_known() || speed < six_step.whole_from {
+        return six_step.duty.duty_max;
+    }
+    let slower = six_step.fastest.saturating_sub(speed);
+    let more = six_step.hold.held(slower);
+    let held = s.held.saturating_add(more >> HOLD_SHIFT);
+    s.held = held.max(I1F31::ZERO).min(six_step.whole);
+    let most = s.held.saturating_add(more);
+    most.max(I1F31::ZERO).min(six_step.whole)
 }
+
+/// Returns a share of the supply as a duty: of the largest of a leg that switches, and at the end of the range the whole.
+fn duty_of(six_step: &Config, share: I1F31) -> I1F31 {
+    let switched = I1F31::from_bits(share.top(six_step.duty.duty_max).to_bits() << 1);
+    let more = share.max(FASTER_FROM) - FASTER_FROM;
+    // The last quarter of the throttle adds all that is left.
+    switched.saturating_add(I1F31::from_bits(
+        more.top(six_step.duty.rest).to_bits() << 3,
+    ))
+}
+
+/// Share from which the duty rises faster.
+const FASTER_FROM: I1F31 = I1F31::lit("0.75");
 
 /// Returns bounds that permit only one current.
 fn only(current: Current) -> Bounds {
@@ -158,8 +186,9 @@ fn only(current: Current) -> Bounds {
 
 /// Regulates the current.
 pub(super) fn hold(six_step: &Config, s: &mut State, i: Current, wanted: Current) {
-    let range = duty::range(&six_step.duty, &mut s.duty, i, only(wanted));
-    duty::share(&mut s.duty, range.greatest, range);
+    let most = six_step.duty.duty_max;
+    let range = duty::range(&six_step.duty, &mut s.duty, i, only(wanted), most);
+    duty::share(&six_step.duty, &mut s.duty, range.greatest, range);
 }
 
 /// Starts speed regulation from the present speed and duty. Until the next demand these bounds hold.
@@ -168,15 +197,31 @@ pub(super) fn take_over(s: &mut State, bounds: Bounds) {
     duty::take_over(&mut s.duty);
     s.wanted = s.duty.duty;
     s.bounds = bounds;
+    s.most = s.duty.duty;
+    s.held = duty::WHOLE;
     s.ask(Piece::Demand);
 }
 
 /// Returns the bridge in the present sextant.
-pub(super) fn bridge(s: &State, swapped: bool) -> Bridge {
+pub(super) fn bridge(
+    six_step: &Config,
+    (s, shared): (&mut State, &mut Shared),
+    swapped: bool,
+) -> Bridge {
     let phases = s.sector.phases(Legs {
-        switching: Some(s.duty.for_bridge()),
+        switching: Some(s.duty.for_bridge(&six_step.duty)),
         low: Some(Duty::ZERO),
         floating: None,
     });
-    Bridge::Legs(in_order(swapped, phases))
+    let phases = in_order(swapped, phases);
+    if s.duty.stays_high {
+        shared.applied.expect_unreadable();
+    }
+    if shared.applied.may_matter() {
+        shared
+            .applied
+            .command(phases.map(|duty| duty.unwrap_or(Duty::ZERO)));
+    }
+    s.were_high = s.were_high << 1 | u8::from(s.duty.stays_high);
+    Bridge::Legs(phases)
 }

@@ -6,8 +6,9 @@
 //! turns round the back-EMF changes its sign, which is taken for a crossing and is as good as one. Run begins after a full
 //! turn of consecutive crossings at `STA_RUN_RPM`.
 //!
-//! Files, each after those it uses: `state`, `duty`, `telemetry`, `outer`, `given`, `start`, `period`.
+//! Files, each after those it uses: `state`, `advance`, `duty`, `telemetry`, `outer`, `given`, `start`, `period`.
 
+mod advance;
 mod duty;
 pub(super) mod given;
 mod outer;

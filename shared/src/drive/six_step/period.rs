@@ -3,9 +3,10 @@
 use super::duty::{self, NO_CURRENT, bridge, hold, take_over};
 use super::given::Position;
 use super::state::State;
-use super::{given, outer, start, telemetry};
+use super::{advance, given, outer, start, telemetry};
 use crate::control::six_step::commutation::{HALF_SEXTANT, SEXTANT};
-use crate::control::six_step::crossing;
+use crate::control::six_step::crossing::{self, Leg};
+use crate::control::six_step::tracking::FEW_PERIODS;
 use crate::drive::config;
 use crate::drive::config::six_step::{Config, LOST_SEXTANTS, PATIENCE_SEEN};
 use crate::drive::io::{Bridge, Rotation, Sample, Setpoint, in_order};
@@ -98,6 +99,13 @@ pub(in crate::drive) fn period(
     } else {
         reading(legs.low).saturating_neg()
     };
+    // With the switching leg at the supply only the new low leg's current is seen, until the released phase's has
+    // decayed.
+    let i = if s.sector.rising() && s.were_high & 2 != 0 && s.crossing.blind() {
+        i.max(s.duty.smoothed)
+    } else {
+        i
+    };
 
     if let Some(position) = position {
         given::follow(six_step, (s, shared), position);
@@ -115,6 +123,15 @@ pub(in crate::drive) fn period(
         }
     } else {
         duty::run(six_step, s, i);
+        let is_due = if s.tracking.omega_bar >= FEW_PERIODS {
+            // A sextant has begun: its samples are then all of one kind.
+            s.crossing.samples == 0
+        } else {
+            s.slot.is_multiple_of(2)
+        };
+        if is_due {
+            s.duty.choose(&six_step.duty);
+        }
         if !s.is_busy {
             let slow = s.tracking.omega_bar < six_step.slow;
             let rotor_is = (slow, position.is_some());
@@ -125,7 +142,7 @@ pub(in crate::drive) fn period(
     if why.is_none() {
         why = outer::run(config, six_step, (s, shared), setpoint, (currents, i));
     }
-    (bridge(s, swapped), why)
+    (bridge(six_step, (s, shared), swapped), why)
 }
 
 /// Returns how the rotor ends Run or Stopping.
@@ -169,6 +186,7 @@ fn crossings(
     let terminal = six_step.terminal.held(terminal);
     let rising = s.sector.rising();
     let seeking = ramping && !s.tracking.is_known();
+    let leg = leg(six_step, s);
     let found = crossing::look(
         &six_step.crossing,
         &mut s.crossing,
@@ -176,9 +194,18 @@ fn crossings(
         seeking,
         s.tracking.certain(),
         terminal,
-        shared.protection.bus,
+        (leg, shared.protection.bus),
     );
+    advance::note(six_step, s);
+    let is_early = s.end < HALF_SEXTANT && !s.crossing.found;
+    let found = if is_early && s.tracking.reaches(s.end, six_step.delay) {
+        // The sextant ends before the crossing can be seen.
+        s.crossing.expected()
+    } else {
+        found
+    };
     if let Some(age) = found {
+        s.crossing.found = true;
         s.tracking.crossed(age);
         s.is_busy = true;
         s.missed = 0;
@@ -193,15 +220,25 @@ fn crossings(
     s.missed < LOST_SEXTANTS && u32::from(s.astray) < patience
 }
 
+/// Returns where the switching leg was at the sample: with a period of delay between the last two commands.
+fn leg(six_step: &Config, s: &State) -> Leg {
+    let both = (2 << six_step.crossing.delayed) - 1;
+    match s.were_high & both {
+        0 => Leg::Low,
+        high if high == both => Leg::High,
+        _ => Leg::Changes,
+    }
+}
+
 /// Commutates if due.
 ///
 /// Until Ramp knows the rotor, a crossing ends its sextant at once. The rotor is then a quarter turn behind the current, or
 /// it has just swung to its backward end, and in the next sextant is pulled forwards from either; when it will be half a
 /// sextant further, nobody knows. A sextant without a crossing ends by its time.
 fn commutate(six_step: &Config, s: &mut State, ramping: bool) {
+    let seeking = ramping && !s.tracking.is_known();
     let found = s.crossing.found;
     let blind = s.crossing.blind();
-    let seeking = ramping && !s.tracking.is_known();
     let patience = six_step.patience * if blind { 1 } else { PATIENCE_SEEN };
     let is_over = s.crossing.samples >= patience;
     let due = if seeking {
@@ -209,7 +246,7 @@ fn commutate(six_step: &Config, s: &mut State, ramping: bool) {
     } else if found || blind {
         // If nothing was seen, the released phase's current hid the crossing, or the rotor was
         // already past it: the estimate tells when the sextant ends.
-        s.tracking.reaches(HALF_SEXTANT, six_step.delay)
+        s.tracking.reaches(s.end, six_step.delay)
     } else if ramping {
         is_over
     } else {
@@ -228,5 +265,6 @@ fn commutate(six_step: &Config, s: &mut State, ramping: bool) {
     }
     s.is_busy = true;
     s.sector = s.sector.next();
+    advance::begin(six_step, s);
     s.crossing.begin(&six_step.crossing);
 }

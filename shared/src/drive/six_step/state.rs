@@ -4,10 +4,11 @@ use fixed::types::I1F31;
 
 use crate::control::PERIODS;
 use crate::control::planner;
-use crate::control::six_step::commutation::Sector;
+use crate::control::six_step::commutation::{HALF_SEXTANT, Sector};
 use crate::control::six_step::{crossing, duty, tracking};
 use crate::control::speed::Bounds;
 use crate::trace::traced;
+use crate::units::Angle;
 
 /// The pieces of the outer loop. In [`PERIODS`] each falls due once, in every second period; it waits for the end of what a
 /// crossing, a commutation or a piece before it takes.
@@ -41,6 +42,10 @@ traced! {
         pub(super) duty: duty::State,
         /// The duty to move to, as far as the bounds permit.
         pub(super) wanted: I1F31,
+        /// The largest duty.
+        pub(super) most: I1F31,
+        /// The integral of what bounds it at the fastest speed that is followed.
+        pub(super) held: I1F31,
         /// The current's bounds.
         pub(super) bounds: Bounds,
         /// The period's place among [`PERIODS`].
@@ -49,6 +54,12 @@ traced! {
         pub(super) due: u8,
         /// In this period a crossing was found, a sextant ended, or a piece was run.
         pub(super) is_busy: bool,
+        /// Whether the switching leg stayed high in the last periods, a bit each, the last one lowest.
+        pub(super) were_high: u8,
+        /// The angle past its middle at which the sextant ends.
+        pub(super) end: Angle,
+        /// Samples without back-EMF since the last commutation, and after the one before.
+        pub(super) hidden: [u16; 2],
         /// Periods since Ramp last tracked the rotor.
         pub(super) astray: u16,
         /// Consecutive periods without current while the low sides are on.
@@ -68,10 +79,15 @@ impl Default for State {
             tracking: tracking::State::at_rest(),
             duty: duty::State::default(),
             wanted: I1F31::ZERO,
+            most: I1F31::ZERO,
+            held: I1F31::ZERO,
             bounds: Bounds::default(),
             slot: 0,
             due: 0,
             is_busy: false,
+            were_high: 0,
+            end: HALF_SEXTANT,
+            hidden: [0; 2],
             astray: 0,
             still: 0,
             missed: 0,

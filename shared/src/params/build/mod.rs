@@ -217,7 +217,11 @@ pub fn build_in(
         CtlDrive::FieldOriented => place.six_step = None,
         // Parameters in force are never automatic.
         CtlDrive::SixStep | CtlDrive::Automatic => {
-            six_step::six_step(&p, duty_max, place.six_step.insert(Default::default()));
+            six_step::six_step(
+                &p,
+                duty_max.min(window),
+                place.six_step.insert(Default::default()),
+            );
         }
     }
     place.slow_periods = if p.chosen(CtlObserver::Hall) {
@@ -246,6 +250,11 @@ pub(crate) fn thresholds(params: &Params, scale: &Scale) -> Thresholds {
         phase: scale.current_from_a(params.get(ParamId::LimPhaseA)),
         bus_return_v: Voltage::from_f32(return_v / scale.voltage_v),
         bus_draw_v: Voltage::from_f32(draw_v / scale.voltage_v),
+        fastest: if params.drives_by_six_step() {
+            six_step::fastest()
+        } else {
+            Speed::MAX
+        },
     }
 }
 

@@ -7,9 +7,12 @@ use fixed::types::I1F31;
 use super::outer;
 use super::si::{Si, TEST_SHARE, TOO_FEW_PERIODS};
 use crate::control::delay::Delay;
+use crate::control::sensing::Shunts;
+use crate::control::six_step::duty::WHOLE;
 use crate::drive::config::six_step::Config;
 use crate::math::Real;
 use crate::params::ParamId;
+use crate::units::Speed;
 
 /// Least voltage on the floating terminal that counts as back-EMF, V, and the same in counts: above noise and the
 /// difference between the conducting switches.
@@ -49,8 +52,25 @@ const PATIENCE_S: f32 = 4e-3;
 /// motors, half are in Run after 0.05 s.
 const ASTRAY_S: f32 = 0.12;
 
+/// Advance of the commutation at full duty, degrees.
+const ADVANCE_DEG: f32 = 30.0;
+
+/// Periods per sextant at the fastest speed that is followed.
+const FASTEST_PERIODS: f32 = 3.5;
+
+/// Loss of duty where that speed is exceeded, over the excess.
+const HOLD: f32 = 4.0;
+
+/// Electrical frequency from which a leg may stay at the supply, Hz.
+const WHOLE_HZ: f32 = 100.0;
+
 /// Greatest current against the rotation over `LIM_PHASE_A`.
 const BRAKING_SHARE: f32 = 0.25;
+
+/// Returns the fastest speed that the samples follow.
+pub(super) fn fastest() -> Speed {
+    Speed::from_f32(1.0 / 6.0 / FASTEST_PERIODS)
+}
 
 pub(super) fn six_step(p: &Si, duty_max: f32, place: &mut Config) {
     p.refuse_above(
@@ -77,6 +97,17 @@ pub(super) fn six_step(p: &Si, duty_max: f32, place: &mut Config) {
     duty.k_b = p.gain(ParamId::LimPhaseA, BOUND_RATE * p.t * p.unit_a / bound_a);
     duty.lead_to_zero_max = p.scale.current_from_a(LEAD_SHARE * p.limit_a);
     duty.duty_max = I1F31::from_f32(duty_max);
+    duty.rest = WHOLE - duty.duty_max;
+    let rest = duty.rest.to_f32();
+    place.whole = match p.board.shunts {
+        Shunts::Three => WHOLE,
+        // The low leg may be the one without a shunt.
+        Shunts::Two => duty.duty_max,
+    };
+    place.advance = p.gain(ParamId::PwmFreqHz, ADVANCE_DEG / 360.0 / rest);
+    place.fastest = fastest();
+    place.hold = p.gain(ParamId::PwmFreqHz, HOLD / place.fastest.to_f32());
+    place.whole_from = Speed::from_f32(TAU * WHOLE_HZ / p.rad_per_unit);
     place.delay = p.board.delay;
     place.patience = p.periods(PATIENCE_S) as u16;
     place.astray = p.periods(ASTRAY_S) as u16;
