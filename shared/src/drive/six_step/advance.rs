@@ -95,8 +95,10 @@ mod tests {
 
     #[test]
     fn a_rotor_that_is_not_known_has_none() {
-        let mut s = State::default();
-        s.hidden = [5, 5];
+        let mut s = State {
+            hidden: [5, 5],
+            ..State::default()
+        };
         s.tracking.omega_bar = Speed::from_num(0.04);
         assert_eq!(angle(&Config::default(), &s), Angle::ZERO);
     }
