@@ -23,15 +23,18 @@ OPEN = {
     **cells([FOC], ["phase_open"], ["start"], "reaction"),
     # A phase is known to be open once the rotor has been seen everywhere over some turns. Where two phases do not turn
     # the motor that far, the six-step drive's duty rises until the current trips.
-    **cells([SIX], ["phase_open"], ["start"], "current", "cause"),
-    **cells([SIX], ["phase_open"], ["half"], "current"),
+    **cells([SIX], ["phase_open"], ["start"], "current"),
     **cells([SIX], ["phase_open"], ["full"], "current", "cause"),
     # At idle a six-step drive without one phase is tried again by starts that have no alignment: their current trips.
     **cells([SIX], ["phase_open"], ["idle"], "current", "cause"),
     # A shorted high side trips the current first; which switch it is shows in the next start alone.
-    **cells([SIX], ["high_short"], ["idle", "half"], "cause"),
-    # The six-step drive keeps its full speed without this switch, within its current, and does not say so.
-    **cells([SIX], ["high_open"], ["full"], "time"),
+    **cells([SIX], ["high_short"], ["idle"], "cause"),
+    # At full duty a phase that is open shows only in the current, which trips; also in the slam from there.
+    **cells([SIX], ["phase_open"], ["braking"], "current", "cause"),
+    # The six-step drive keeps its full speed without this switch, within its current, and says only that its duty ends.
+    **cells([SIX], ["high_open"], ["full"], "cause"),
+    # With a leg at a supply that is gone, the crossings are lost before the voltage is.
+    **cells([SIX], ["disconnect"], ["full"], "cause"),
     # With a switch that never turns on, the torque that low speed allows, a drop as large as the back-EMF, takes the
     # others' currents up to 1.4 A above 1.2 times the limit in a start. With half of that torque it is met, and thrust
     # comes later.
@@ -50,7 +53,6 @@ OPEN = {
     **cells([SIX], ["rotor_blocked"], ["half"], "current"),
     **cells([SIX], ["rotor_blocked"], ["idle"], "time"),
     **cells([SIX], ["rotor_blocked"], ["start"], "current", "reaction"),
-    **cells([SIX], ["rotor_blocked"], ["braking"], "current"),
     **cells([FOC], ["rotor_blocked"], ["braking"], "current"),
     # Nearly all of the back-EMF vanishes faster than the currents are regulated.
     **cells([FOC, SIX], ["strike"], ["full"], "current"),
