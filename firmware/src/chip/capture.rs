@@ -29,12 +29,7 @@ pub(crate) fn attend(timer: TimGp32) {
     }
     // By now the DMA has read the edge's time, which cleared its flag: what is left is the alarm's.
     let alarm = timer.sr().read().ccif(ALARM);
-    let edges = wanted.ccie(0);
-    if !alarm && !edges {
-        // Pended by an edge before waiting for the alarm alone.
-        return;
-    }
-    EDGE.store(edges && !alarm, Ordering::Relaxed);
+    EDGE.store(!alarm, Ordering::Relaxed);
     // Once is enough: the task re-enables them when it wants to be woken again.
     set_interrupts(timer, false, false);
     WAKER.wake();
@@ -67,7 +62,7 @@ pub(crate) fn capture_on(timer: TimGp32, channel: usize, pin_channel: usize) {
     });
 }
 
-/// Waits for an edge. Returns true if one came before the alarm.
+/// Waits for an edge. Returns true if one came before the alarm. The interrupt must not be pending.
 pub(crate) async fn wait_for_edge(
     timer: TimGp32,
     alarm_ticks: u32,
@@ -86,7 +81,7 @@ pub(crate) async fn wait_for_edge(
     EDGE.load(Ordering::Relaxed)
 }
 
-/// Waits for the alarm.
+/// Waits for the alarm. The interrupt must not be pending.
 pub(crate) async fn wait_for_alarm(
     timer: TimGp32,
     alarm_ticks: u32,

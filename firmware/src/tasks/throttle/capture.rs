@@ -19,6 +19,10 @@ use crate::edges::{Edges, LEN, Memory};
 /// others. 0.5 µs.
 const SETTLED_TICKS: u32 = TICK_HZ / 2_000_000;
 
+/// Its interrupt. A wait that ends before the task has left the processor leaves it pending, and the next one would
+/// take it for an edge: each wait begins with it clear.
+type CaptureInterrupt = <CaptureTimer as GeneralInstance1Channel>::CaptureCompareInterrupt;
+
 /// The counter's maximum.
 const COUNTER_MASK: u32 = u32::MAX >> (32 - TIMER_BITS);
 
@@ -72,7 +76,7 @@ impl Capture {
         CAPTURE.egr().write(|w| w.set_ug(true));
         CAPTURE.cr1().modify(|w| w.set_cen(true));
         // SAFETY: the handler touches nothing but the timer, and wakes a task.
-        unsafe { <CaptureTimer as GeneralInstance1Channel>::CaptureCompareInterrupt::enable() };
+        unsafe { CaptureInterrupt::enable() };
         Self {
             edges: Edges::new(MEMORY.each_ref(), SETTLED_TICKS),
             transfers,
@@ -90,6 +94,7 @@ impl Capture {
     pub(super) async fn wait_for_edge(&mut self, due_ticks: u32) -> bool {
         let is_past = |now_ticks: u32| now_ticks.wrapping_sub(due_ticks) as i32 >= 0;
         let alarm_ticks = due_ticks & COUNTER_MASK;
+        CaptureInterrupt::unpend();
         wait_for_edge(CAPTURE, alarm_ticks, || is_past(self.now())).await
     }
 
@@ -101,6 +106,7 @@ impl Capture {
             return;
         }
         let alarm_ticks = due_ticks & COUNTER_MASK;
+        CaptureInterrupt::unpend();
         wait_for_alarm(CAPTURE, alarm_ticks, || is_past(self.now())).await;
     }
 

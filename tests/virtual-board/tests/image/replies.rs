@@ -75,12 +75,11 @@ impl Seen {
     }
 }
 
-/// How many of the [`FRAMES`] may stay without a reply: half a percent. At DShot1200 there are 43 µs from a
-/// frame's first edge to its reply, of which the task takes 30 and the PWM interrupt up to 11: if other
-/// interrupts coincide with these, the reply would begin too late, and is left out. How often that happens
-/// depends on how the frames fall against the PWM, and changes from one image to the next: none to 30 so far.
-/// The flight controller then continues with the speed from the previous frame.
-const LATE: usize = FRAMES / 200;
+/// How many of the [`FRAMES`] may stay without a reply: a tenth of a percent. At DShot1200 there are 43 µs from a
+/// frame's first edge to its reply, of which the task takes 26 and the PWM interrupt up to 11: if other interrupts
+/// coincide with these, the reply would begin too late, and is left out. The flight controller then continues with the
+/// speed from the previous frame.
+const LATE: usize = FRAMES / 1000;
 
 /// Asserts that every reply is read; `close_ns` is the closest frame interval for which this must hold.
 fn every_reply_is_read(protocol: u8, bit_hz: f64, close_ns: f64) {
