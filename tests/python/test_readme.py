@@ -135,8 +135,9 @@ def is_run_elsewhere(command: list[str]) -> bool:
     """Returns whether another test runs it as in the README."""
     path, words = program(command)
     if path is None:
-        # This test is part of the first; tests/flight/test_flight.py runs the others.
-        return words == ["tests/run"] or "tests/flight/fly.py" in words or "flight-picture" in words
+        # This test is part of the first; tests/flight/test_flight.py and test_throttle_curve.py run the others.
+        pictures = {"flight-picture", "throttle-curve"}
+        return words == ["tests/run"] or "tests/flight/fly.py" in words or bool(pictures & set(words))
     if path == VIRTUAL_BOARD:
         # test_virtual_board.py
         return True
@@ -147,6 +148,9 @@ def is_run_elsewhere(command: list[str]) -> bool:
         return False
     if words == ["bench"]:
         return "cargo run --release -- bench" in (ROOT / "tests" / "run").read_text()
+    if words[:2] == ["scenario", "tests/scenarios/throttle-curve.toml"]:
+        # test_throttle_curve.py
+        return True
     if words[0] == "scenario" and "--record" not in words:
         scenario = ROOT / words[1]
         assert scenario.parent == SCENARIOS and scenario.exists(), words
