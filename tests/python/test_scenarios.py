@@ -19,6 +19,7 @@ FAULTS = {
     "over-current": "over-current",
     "over-temperature": "over-temperature",
     "over-voltage": "over-voltage",
+    "trip-weakened": "over-current",
     "under-voltage": "under-voltage",
 }
 
