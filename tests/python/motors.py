@@ -18,11 +18,13 @@ FROM_MOTOR = ["CTL_RPM_MIN", *SETTINGS]
 
 
 def tune(params: dict) -> dict:
-    """Returns what `siskin tune` makes of these parameters."""
+    """Returns the settings that `siskin tune` makes of these parameters."""
     words = [f"--param={name}={value:.6g}" for name, value in params.items()]
     ended = subprocess.run([str(TOOL), "tune", "--json", *words], capture_output=True, text=True, timeout=60)
     assert ended.returncode == 0, ended.stderr
-    return json.loads(ended.stdout)
+    followed = json.loads(ended.stdout)
+    del followed["top_speed"]
+    return followed
 
 
 def toml(table: dict) -> str:

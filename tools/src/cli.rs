@@ -306,10 +306,13 @@ pub(crate) struct TuneArgs {
     /// Poles of the motor, twice MOT_POLE_PAIRS.
     #[arg(long, value_name = "N", value_parser = even)]
     pub(crate) poles: Option<u32>,
+    /// Voltage of the supply for the top speed; without it, LIM_BUS_V_MAX.
+    #[arg(long, value_name = "V", value_parser = positive)]
+    pub(crate) supply: Option<f64>,
     /// Write the motor's parameters and the settings to a file for 'siskin params load'.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
-    /// One JSON object, name to value.
+    /// One JSON object: each setting, and top_speed with its bounds.
     #[arg(long)]
     pub(crate) json: bool,
 }

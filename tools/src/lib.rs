@@ -32,6 +32,7 @@ mod scope;
 mod session;
 mod signing;
 mod step_by_step;
+mod top_speed;
 mod tune;
 
 use std::io;

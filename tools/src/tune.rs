@@ -1,16 +1,17 @@
-//! `siskin tune`: the settings of the start and the control loops that follow from a motor.
+//! `siskin tune`: the settings of the start and the control loops that follow from a motor, and its top speed.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write;
 
-use serde_json::{Map, Value};
-use siskin_control::params::{FromMotor, ParamId, Params};
+use serde_json::{Map, Value, json};
+use siskin_control::params::{BuildError, FromMotor, ParamId, Params};
 
 use crate::cli::TuneArgs;
 use crate::error::Error;
 use crate::params::{NAME_LENGTH, Param};
+use crate::top_speed::TopSpeed;
 use crate::{given, json, param_file, param_text};
 
 /// The motor, and what else its settings are computed from.
@@ -71,14 +72,21 @@ pub(crate) fn run(
         let text = param_file::write("a motor and its settings", &lines);
         fs::write(path, text).map_err(|error| Error::file(path, error))?;
     }
+    let supply_v = args
+        .supply
+        .unwrap_or_else(|| made.get(ParamId::LimBusVMax).into());
+    let top_speed = TopSpeed::new(&params, supply_v);
     if args.json {
         let values = settings.iter().map(|setting| {
             let name = setting.id.entry().name.to_owned();
             (name, json::number(setting.value))
         });
-        writeln!(out, "{}", Value::Object(values.collect::<Map<_, _>>()))?;
+        let mut values: Map<_, _> = values.collect();
+        values.insert("top_speed".to_owned(), top_speed_json(&top_speed));
+        writeln!(out, "{}", Value::Object(values))?;
     } else {
         write!(out, "{}", table(&params, &made, &settings))?;
+        write!(out, "{}", top_speed_table(&top_speed, supply_v))?;
     }
     Ok(())
 }
@@ -125,6 +133,42 @@ fn table(params: &Params, made: &Params, settings: &[Setting]) -> String {
         line(name, &param_text::value(name, three_digits(*value)), from);
     }
     out
+}
+
+/// Returns the top speed with its bounds, the lowest first; null if the parameters make no drive.
+fn top_speed_json(top_speed: &Result<TopSpeed, BuildError>) -> Value {
+    let Ok(top_speed) = top_speed else {
+        return Value::Null;
+    };
+    let bounds = top_speed.bounds.iter();
+    let bounds = bounds.map(|bound| json!({"name": bound.name, "rpm": bound.rpm.round()}));
+    json!({
+        "bounds": bounds.collect::<Vec<_>>(),
+        "turn_periods": json::fixed(top_speed.turn_periods, 1).parse::<f64>().ok(),
+    })
+}
+
+/// Returns the bounds of the speed, the lowest first.
+fn top_speed_table(top_speed: &Result<TopSpeed, BuildError>, supply_v: f64) -> String {
+    let top_speed = match top_speed {
+        Ok(top_speed) => top_speed,
+        Err(error) => {
+            let name = error.param.entry().name;
+            return format!("\nno drive: {name}: {}\n", error.reason);
+        }
+    };
+    let mut out = format!("\ntop speed at {supply_v} V without a propeller, the lowest counts\n");
+    for bound in &top_speed.bounds {
+        let rpm = format!("{:.0} rpm", bound.rpm);
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            out,
+            "{:<NAME_LENGTH$} {rpm:<14} {}",
+            bound.name, bound.reason
+        );
+    }
+    let periods = json::fixed(top_speed.turn_periods, 1);
+    out + &format!("PWM periods in an electrical turn there: {periods}\n")
 }
 
 /// Rounds to as many digits as people read.

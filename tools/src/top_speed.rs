@@ -1,0 +1,207 @@
+//! The top speed of a motor without a propeller, and what bounds it.
+//!
+//! The voltage is that of the machine's steady equations with no current along q; what the drive has of it, the most
+//! i_d and the fastest speed that samples follow are the control's own, as built from the parameters.
+
+use std::f64::consts::{FRAC_2_PI, TAU};
+
+use siskin_control::control::delay::Delay;
+use siskin_control::control::sensing::Shunts;
+use siskin_control::drive::Config;
+use siskin_control::image::Image;
+use siskin_control::params::choice::CtlMode;
+use siskin_control::params::{Board, BuildError, Greatest, LeastDeadTime, ParamId, Params, build};
+use siskin_control::units::Current;
+
+/// Fundamental of the voltage over the supply: of six-step, and of a vector to the hexagon's corners
+/// (`control::modulator`).
+const SIX_STEP: f64 = FRAC_2_PI;
+const OVERMODULATED: f64 = 0.609;
+
+/// Share of the voltage that flux weakening uses; the rest keeps the current regulated (`control::weakening`).
+const RESERVED: f64 = 0.98;
+
+/// Units of i_d for each turn a period that is left to the speed where weakening ends (`control::weakening`).
+const TAPER: f64 = 128.0;
+
+/// Voltage of the full throttle over the length up to which every phase switches, where the flux may be weakened: the
+/// motor turns as if the supply had that (`control::voltage`).
+const FULL_THROTTLE: f64 = 1.5625;
+
+/// A speed that is not exceeded.
+pub(crate) struct Bound {
+    /// The parameter that sets it, or the supply.
+    pub(crate) name: &'static str,
+    pub(crate) rpm: f64,
+    /// What happens there.
+    pub(crate) reason: &'static str,
+}
+
+/// What bounds the speed of a motor.
+pub(crate) struct TopSpeed {
+    /// The lowest first.
+    pub(crate) bounds: Vec<Bound>,
+    /// PWM periods in an electrical turn at the lowest.
+    pub(crate) turn_periods: f64,
+}
+
+impl TopSpeed {
+    /// Computes the bounds at a supply voltage.
+    ///
+    /// # Errors
+    /// The parameters make no drive.
+    pub(crate) fn new(stated: &Params, supply_v: f64) -> Result<Self, BuildError> {
+        let made = stated.in_force();
+        let get = |id| f64::from(made.get(id));
+        let config = build(stated, &any_board(&made))?;
+        let per_rpm = get(ParamId::MotPolePairs) / 60.0;
+        let mut bounds = Vec::new();
+        if made.chosen(CtlMode::Speed) {
+            bounds.push(Bound {
+                name: "CTL_RPM_MAX",
+                rpm: get(ParamId::CtlRpmMax),
+                reason: "full throttle asks for it",
+            });
+        }
+        if let Some(six_step) = &config.six_step {
+            bounds.push(Bound {
+                name: "PWM_FREQ_HZ",
+                rpm: f64::from(config.scale.rpm(six_step.fastest)),
+                reason: "the samples follow no faster commutation",
+            });
+        }
+        let flux_wb = 1e-3 * f64::from(stated.get(ParamId::MotFluxMwb));
+        if flux_wb > 0.0 {
+            let motor = Motor {
+                flux_wb,
+                inductance_h: 1e-6 * get(ParamId::MotLUh),
+                resistance_ohm: 1e-3 * get(ParamId::MotRMohm),
+                pole_pairs: get(ParamId::MotPolePairs),
+            };
+            bounds.push(motor.bound(&config, supply_v));
+            if made.chosen(CtlMode::Voltage) && config.six_step.is_none() {
+                bounds.push(motor.throttle(&config, supply_v));
+            }
+        }
+        bounds.sort_by(|a, b| a.rpm.total_cmp(&b.rpm));
+        // There is one: six-step has that of its samples, and field orientation is refused without the flux.
+        let turn_periods = get(ParamId::PwmFreqHz) / (per_rpm * bounds[0].rpm);
+        Ok(Self {
+            bounds,
+            turn_periods,
+        })
+    }
+}
+
+/// A motor in SI units.
+struct Motor {
+    flux_wb: f64,
+    inductance_h: f64,
+    resistance_ohm: f64,
+    pole_pairs: f64,
+}
+
+impl Motor {
+    /// Converts an electrical speed.
+    fn rpm(&self, rad_s: f64) -> f64 {
+        60.0 * rad_s / (TAU * self.pole_pairs)
+    }
+
+    /// Returns the speed at which the voltage is used up.
+    fn bound(&self, config: &Config, supply_v: f64) -> Bound {
+        let modulator = &config.modulator;
+        let share = if config.six_step.is_some() {
+            SIX_STEP
+        } else if modulator.over.vector_max > modulator.vector_max {
+            OVERMODULATED
+        } else {
+            modulator.vector_max.to_num()
+        };
+        let most_v = share * supply_v;
+        let unweakened = Bound {
+            name: "supply",
+            rpm: self.rpm(most_v / self.flux_wb),
+            reason: "its voltage is used up",
+        };
+        let weakened = weakens(config).then(|| self.weakened(config, RESERVED * most_v));
+        weakened
+            .filter(|weakened| weakened.rpm > unweakened.rpm)
+            .unwrap_or(unweakened)
+    }
+
+    /// Returns the speed that full throttle asks for in voltage mode.
+    fn throttle(&self, config: &Config, supply_v: f64) -> Bound {
+        let share: f64 = config.modulator.vector_max.to_num();
+        let full = if weakens(config) { FULL_THROTTLE } else { 1.0 };
+        Bound {
+            name: "CTL_MODE",
+            rpm: self.rpm(full * share * supply_v / self.flux_wb),
+            reason: "full throttle asks for its voltage",
+        }
+    }
+
+    /// Returns the speed at which the flux cannot be weakened further.
+    fn weakened(&self, config: &Config, most_v: f64) -> Bound {
+        let (scale, weakening) = (&config.scale, &config.weakening);
+        let end_rpm = f64::from(scale.rpm(weakening.end));
+        let most_a = f64::from(scale.amperes(weakening.most));
+        let a_per_rpm = TAPER * f64::from(scale.current_a * scale.period_s) / self.rpm(TAU);
+        let left_a = |rpm: f64| (a_per_rpm * (end_rpm - rpm)).min(most_a);
+        let is_reached = |rpm: f64| {
+            let i_d = left_a(rpm);
+            let induced_v = rpm / self.rpm(1.0) * (self.flux_wb - self.inductance_h * i_d);
+            induced_v.hypot(self.resistance_ohm * i_d) <= most_v
+        };
+        let (mut low, mut high) = (0.0, end_rpm);
+        while high - low > 0.1 {
+            let middle = f64::midpoint(low, high);
+            if is_reached(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let (name, reason) = if left_a(low) < most_a {
+            (
+                "LIM_BUS_V_MAX",
+                "a bridge that turns off would rectify more",
+            )
+        } else {
+            (
+                "CTL_WEAKEN",
+                "it or LIM_PHASE_A allows no further weakening of the flux",
+            )
+        };
+        Bound {
+            name,
+            rpm: low,
+            reason,
+        }
+    }
+}
+
+/// Returns whether the drive weakens the flux.
+fn weakens(config: &Config) -> bool {
+    config.six_step.is_none() && config.weakening.most > Current::ZERO
+}
+
+/// Returns a board whose sensors reach beyond the limits, so that it refuses nothing.
+fn any_board(made: &Params) -> Board {
+    let range_a = 2.0 * made.get(ParamId::LimPhaseA);
+    Board {
+        image: Image::EMULATOR,
+        current_a_per_count: range_a / 2048.0,
+        bus_v_per_count: 70.0 / 4096.0,
+        current_range_a: range_a,
+        greatest_phase: Board::greatest_phase(range_a),
+        greatest_supply: Greatest::ANY,
+        terminal_v_per_count: 70.0 / 4096.0,
+        shunts: Shunts::Three,
+        delay: Delay::One,
+        low_side_on_s: 1e-6,
+        refresh_s: 1e-6,
+        charge_s: 63e-6,
+        least_dead_time: LeastDeadTime::NONE,
+        pwm_bounds: &[],
+    }
+}
