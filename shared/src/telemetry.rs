@@ -119,6 +119,11 @@ impl Telemetry {
         }
     }
 
+    /// Returns true if the drive knows the rotor and turns it, either way.
+    pub fn turns(&self) -> bool {
+        self.phase == Phase::Run && self.rpm.abs() >= AT_REST_RPM
+    }
+
     /// Takes in the drive's snapshot, `time_us` after the previous one.
     pub fn observe(&mut self, snapshot: &Snapshot, scale: &Scale, time_us: u64) {
         self.rpm = scale.rpm(snapshot.speed);

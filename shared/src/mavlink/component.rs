@@ -50,6 +50,8 @@ pub struct Component {
     /// As of the last poll.
     faults: Faults,
     failed_starts: u8,
+    /// When the motor last turned, or was not to.
+    stands_since_us: u64,
     infos: u16,
     telemetries: u16,
     image: Image,
@@ -83,6 +85,7 @@ impl Component {
             announcer: Announcer::new(),
             faults: Faults::NONE,
             failed_starts: 0,
+            stands_since_us: 0,
             infos: 0,
             telemetries: 0,
             image: *image,

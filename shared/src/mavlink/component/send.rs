@@ -22,6 +22,9 @@ use crate::telemetry::SIGNALS;
 /// FILE_TRANSFER_PROTOCOL.
 const FILE: (u32, u8) = id_of::<FILE_TRANSFER_PROTOCOL_DATA>();
 
+/// Time after which a motor that is asked to turn and does not is reported, and again, µs.
+const STANDS_US: u64 = 3_000_000;
+
 impl Component {
     /// Sends all that is pending or due, one call of `send` per frame. Call it every millisecond or so.
     ///
@@ -75,7 +78,7 @@ impl Component {
     }
 
     /// Reports faults in words, and by an immediate ESC_INFO, whose flags would otherwise be up to a second late.
-    fn report_faults(&mut self, context: &Context, send: &mut dyn FnMut(&[u8])) {
+    fn report_faults(&mut self, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
         let faults = context.telemetry.faults;
         if core::mem::replace(&mut self.faults, faults) != faults {
             self.schedule.hasten(Stream::EscInfo);
@@ -94,6 +97,19 @@ impl Component {
         let before = core::mem::replace(&mut self.failed_starts, failed);
         if failed != before && failed != 0 && faults.is_empty() {
             let text = "Start failed: retrying";
+            self.text(MavSeverity::MAV_SEVERITY_WARNING, &[text], send);
+        }
+        self.report_standing(context, send);
+    }
+
+    /// Says so where throttle does not turn the motor, whatever the reason.
+    fn report_standing(&mut self, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
+        let rests = context.authority.command().rests();
+        if rests || context.telemetry.turns() || !context.telemetry.faults.is_empty() {
+            self.stands_since_us = context.now_us;
+        } else if context.now_us - self.stands_since_us >= STANDS_US {
+            self.stands_since_us = context.now_us;
+            let text = "Motor does not turn: raise throttle or LIM_PHASE_A";
             self.text(MavSeverity::MAV_SEVERITY_WARNING, &[text], send);
         }
     }
