@@ -77,6 +77,7 @@ class Walk:
 
     def __init__(self, image: Image, function: Function, instructions: dict):
         self.image, self.function, self.instructions = image, function, instructions
+        self.constants = {place for each in instructions.values() if (place := constant_place(each)) is not None}
         self.code = Code()
         self.seen = {}
         self.calls = {}
@@ -171,10 +172,10 @@ class Walk:
         return instruction.id == arm.ARM_INS_BX or arm.ARM_REG_PC in written
 
     def table(self, instruction) -> list[int]:
-        """Returns where a jump table leads: up to the next instruction, and within the function."""
+        """Returns where a jump table leads: up to the next instruction or constant, and within the function."""
         width = 1 if instruction.id == arm.ARM_INS_TBB else 2
         base = instruction.address + 4
-        later = [address for address in self.instructions if address >= base]
+        later = [address for address in (*self.instructions, *self.constants) if address >= base]
         end = min(later, default=self.function.end)
         data = self.image.read(base, end - base)
         entries = [data[i : i + width] for i in range(0, len(data) - width + 1, width)]
@@ -227,17 +228,22 @@ class Walk:
         return None
 
     def literal(self, instruction):
-        memory = instruction.operands[1].mem
-        if memory.base != arm.ARM_REG_PC or memory.index:
-            return None
-        place = (instruction.address & ~3) + 4 + memory.disp
-        return self.number(self.image.word(place), place)
+        place = constant_place(instruction)
+        return None if place is None else self.number(self.image.word(place), place)
 
     def number(self, value: int, place: int) -> Number:
         is_address = place in self.image.addresses
         if is_address:
             self.code.uses[place] = value
         return Number(value, is_address, place)
+
+
+def constant_place(instruction) -> int | None:
+    """Returns where the constant is that it loads."""
+    memory = next((operand.mem for operand in instruction.operands if operand.type == arm.ARM_OP_MEM), None)
+    if memory is None or memory.base != arm.ARM_REG_PC or memory.index:
+        return None
+    return (instruction.address & ~3) + 4 + memory.disp
 
 
 def kept(registers: dict) -> dict:
