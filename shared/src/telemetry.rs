@@ -119,9 +119,9 @@ impl Telemetry {
         }
     }
 
-    /// Returns true if the drive knows the rotor and turns it, either way.
+    /// Returns true if the drive knows the rotor and turns it, either way: at half of the least `CTL_RPM_MIN` or faster.
     pub fn turns(&self) -> bool {
-        self.phase == Phase::Run && self.rpm.abs() >= AT_REST_RPM
+        self.phase == Phase::Run && 2.0 * self.rpm.abs() >= AT_REST_RPM
     }
 
     /// Takes in the drive's snapshot, `time_us` after the previous one.

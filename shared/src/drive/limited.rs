@@ -21,6 +21,9 @@ pub struct Thresholds {
 /// A quantity at its bound lies within a sixteenth of it: the regulator's ripple is smaller.
 const NEAR_SHIFT: u32 = 4;
 
+/// A speed that is held wavers by a percent: within a sixty-fourth it is.
+const HELD_SHIFT: u32 = 6;
+
 impl Thresholds {
     /// Returns the limits that are active now.
     pub fn limits(&self, snapshot: &Snapshot) -> Limits {
@@ -55,9 +58,8 @@ impl Thresholds {
             Limit::RegenCurrent,
         );
         note(snapshot.bus > self.bus_return_v, Limit::BusVoltage);
-        // Where it is held the speed wavers by a percent.
         note(
-            snapshot.speed.saturating_abs() >= self.fastest - (self.fastest >> NEAR_SHIFT),
+            snapshot.speed.saturating_abs() >= self.fastest - (self.fastest >> HELD_SHIFT),
             Limit::CommutationRate,
         );
         // The longest voltage without over-modulation is 1/√3 of the supply; 1/2 + 1/16 is 3 % less.
@@ -160,7 +162,7 @@ mod tests {
 
     #[test]
     fn a_motor_at_the_fastest_speed_that_six_step_follows_is_held() {
-        for (share, wanted) in [(0.9, None), (0.97, Some(Limit::CommutationRate))] {
+        for (share, wanted) in [(0.97, None), (0.99, Some(Limit::CommutationRate))] {
             let (mut thresholds, mut snapshot) = at(0.0, 0.5);
             thresholds.fastest = Speed::from_num(0.05);
             for direction in [1.0, -1.0] {

@@ -163,18 +163,18 @@ fn most_duty(six_step: &Config, s: &mut State) -> I1F31 {
     most.max(I1F31::ZERO).min(six_step.whole)
 }
 
-/// Returns a share of the supply as a duty: of the largest of a leg that switches, and at the end of the range the whole.
+/// Share from which the duty rises faster.
+const FASTER_FROM: I1F31 = I1F31::lit("0.75");
+
+/// Returns a share of the throttle as a duty: of the largest of a leg that switches, and at the end of the range the whole
+/// that the board can read.
 fn duty_of(six_step: &Config, share: I1F31) -> I1F31 {
     let switched = I1F31::from_bits(share.top(six_step.duty.duty_max).to_bits() << 1);
     let more = share.max(FASTER_FROM) - FASTER_FROM;
     // The last quarter of the throttle adds all that is left.
-    switched.saturating_add(I1F31::from_bits(
-        more.top(six_step.duty.rest).to_bits() << 3,
-    ))
+    let left = six_step.whole - six_step.duty.duty_max;
+    switched.saturating_add(I1F31::from_bits(more.top(left).to_bits() << 3))
 }
-
-/// Share from which the duty rises faster.
-const FASTER_FROM: I1F31 = I1F31::lit("0.75");
 
 /// Returns bounds that permit only one current.
 fn only(current: Current) -> Bounds {
@@ -224,4 +224,32 @@ pub(super) fn bridge(
     }
     s.were_high = s.were_high << 1 | u8::from(s.duty.stays_high);
     Bridge::Legs(phases)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::sensing::Shunts;
+    use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
+
+    #[test]
+    fn the_throttle_ends_where_the_duty_does_with_two_shunts_and_three() {
+        for shunts in [Shunts::Two, Shunts::Three] {
+            let board = Board {
+                shunts,
+                ..Board::BENCH
+            };
+            let mut params = Params::of(&BOSSO_BENCH);
+            for (id, value) in [(ParamId::CtlDrive, 1.0), (ParamId::PwmFreqHz, 40_000.0)] {
+                params.set(id, value).expect("in range");
+            }
+            let config = build(&params, &board).expect("it makes a drive");
+            let six_step = config.six_step.as_ref().expect("chosen");
+            let at = |share: f64| duty_of(six_step, I1F31::saturating_from_num(share));
+            let steps = (0..=100).map(|percent| at(f64::from(percent) / 100.0));
+            assert!(steps.clone().zip(steps.skip(1)).all(|(a, b)| a < b));
+            let end = f64::from(at(1.0)) - f64::from(six_step.whole);
+            assert!(end.abs() < 1e-6, "{shunts:?}: {end}");
+        }
+    }
 }

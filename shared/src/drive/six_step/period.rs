@@ -101,7 +101,8 @@ pub(in crate::drive) fn period(
     };
     // With the switching leg at the supply only the new low leg's current is seen, until the released phase's has
     // decayed.
-    let i = if s.sector.rising() && s.were_high & 2 != 0 && s.crossing.blind() {
+    let was_high = s.were_high >> six_step.crossing.delayed & 1 != 0;
+    let i = if s.sector.rising() && was_high && s.crossing.blind() {
         i.max(s.duty.smoothed)
     } else {
         i
@@ -208,7 +209,12 @@ fn crossings(
         s.crossing.found = true;
         s.tracking.crossed(age);
         s.is_busy = true;
-        s.missed = 0;
+        // A crossing that is only expected proves no rotor.
+        s.missed = if s.crossing.shows_rotor(&six_step.crossing) {
+            0
+        } else {
+            s.missed.saturating_add(1)
+        };
     }
     commutate(six_step, s, ramping);
     s.astray = if seeking {

@@ -109,7 +109,7 @@ impl Component {
             self.stands_since_us = context.now_us;
         } else if context.now_us - self.stands_since_us >= STANDS_US {
             self.stands_since_us = context.now_us;
-            let text = "Motor does not turn: raise throttle or LIM_PHASE_A";
+            let text = "Motor does not turn";
             self.text(MavSeverity::MAV_SEVERITY_WARNING, &[text], send);
         }
     }

@@ -3,6 +3,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 
 use super::*;
+use crate::drive::Fault;
 use crate::input::authority::Command;
 
 mod calibration;
@@ -312,6 +313,39 @@ fn an_actuator_test_that_cannot_be_is_refused() {
         REJECTED as u8
     );
     assert_eq!(bench.authority.command(), Command::Stop);
+}
+
+#[test]
+fn a_motor_that_is_to_turn_and_does_not_is_told_every_3_s() {
+    let told = |sent: &[Sent]| -> usize {
+        let texts = texts(sent);
+        texts
+            .iter()
+            .filter(|text| **text == "Motor does not turn")
+            .count()
+    };
+    let mut bench = Bench::new();
+    assert_eq!(told(&bench.run_ms(7_000)), 0, "nothing asks it to");
+    assert_eq!(
+        bench.result(310, &[0.1, 3.0, 0.0, 0.0, 1.0]),
+        ACCEPTED as u8
+    );
+    assert_eq!(told(&bench.run_ms(2_990)), 0);
+    assert_eq!(told(&bench.run_ms(20)), 1);
+    assert_eq!(told(&bench.run_ms(2_980)), 0);
+    assert_eq!(told(&bench.run_ms(20)), 1);
+    // Slow, but it follows.
+    (bench.telemetry.phase, bench.telemetry.rpm) = (Phase::Run, -60.0);
+    assert_eq!(told(&bench.run_ms(7_000)), 0);
+    // Pulled by hand while the drive seeks it.
+    (bench.telemetry.phase, bench.telemetry.rpm) = (Phase::Ramp, 500.0);
+    assert_eq!(told(&bench.run_ms(3_010)), 1);
+    // The fault says why.
+    bench.telemetry.faults.insert(Fault::Stuck);
+    assert_eq!(told(&bench.run_ms(7_000)), 0);
+    bench.telemetry.faults = Faults::NONE;
+    bench.authority.disarm();
+    assert_eq!(told(&bench.run_ms(7_000)), 0);
 }
 
 #[test]

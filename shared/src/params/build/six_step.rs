@@ -4,8 +4,8 @@ use core::f32::consts::TAU;
 
 use fixed::types::I1F31;
 
-use super::outer;
 use super::si::{Si, TEST_SHARE, TOO_FEW_PERIODS};
+use super::{OVERMODULATION_HZ, outer};
 use crate::control::delay::Delay;
 use crate::control::sensing::Shunts;
 use crate::control::six_step::duty::WHOLE;
@@ -61,9 +61,6 @@ const FASTEST_PERIODS: f32 = 3.5;
 /// Loss of duty where that speed is exceeded, over the excess.
 const HOLD: f32 = 4.0;
 
-/// Electrical frequency from which a leg may stay at the supply, Hz.
-const WHOLE_HZ: f32 = 100.0;
-
 /// Greatest current against the rotation over `LIM_PHASE_A`.
 const BRAKING_SHARE: f32 = 0.25;
 
@@ -107,7 +104,7 @@ pub(super) fn six_step(p: &Si, duty_max: f32, place: &mut Config) {
     place.advance = p.gain(ParamId::PwmFreqHz, ADVANCE_DEG / 360.0 / rest);
     place.fastest = fastest();
     place.hold = p.gain(ParamId::PwmFreqHz, HOLD / place.fastest.to_f32());
-    place.whole_from = Speed::from_f32(TAU * WHOLE_HZ / p.rad_per_unit);
+    place.whole_from = Speed::from_f32(TAU * OVERMODULATION_HZ / p.rad_per_unit);
     place.delay = p.board.delay;
     place.patience = p.periods(PATIENCE_S) as u16;
     place.astray = p.periods(ASTRAY_S) as u16;

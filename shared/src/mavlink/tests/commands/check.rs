@@ -60,10 +60,7 @@ fn it_needs_a_motor_at_rest_without_a_fault() {
     bench.telemetry.rpm = 500.0;
     assert_eq!(bench.result(RUN, &[]), REJECTED as u8);
     bench.telemetry.rpm = 0.0;
-    bench
-        .telemetry
-        .faults
-        .insert(crate::drive::Fault::OverCurrent);
+    bench.telemetry.faults.insert(Fault::OverCurrent);
     assert_eq!(bench.result(RUN, &[]), REJECTED as u8);
     assert_eq!(bench.component.take_act(), None);
 }
