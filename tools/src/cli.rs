@@ -306,15 +306,18 @@ pub(crate) struct TuneArgs {
     /// Poles of the motor, twice MOT_POLE_PAIRS.
     #[arg(long, value_name = "N", value_parser = even)]
     pub(crate) poles: Option<u32>,
-    /// Voltage of the supply for the top speed; without it, LIM_BUS_V_MAX.
+    /// Voltage of the supply for the top speed, LIM_BUS_V_MIN to LIM_BUS_V_MAX; without it, LIM_BUS_V_MAX.
     #[arg(long, value_name = "V", value_parser = positive)]
     pub(crate) supply: Option<f64>,
     /// Write the motor's parameters and the settings to a file for 'siskin params load'.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
-    /// One JSON object: each setting, and top_speed with its bounds.
+    /// One JSON object: each setting by its name.
     #[arg(long)]
     pub(crate) json: bool,
+    /// With --json, add the top speed and what bounds it as `top_speed`: null if the parameters make no drive.
+    #[arg(long, requires = "json")]
+    pub(crate) top_speed: bool,
 }
 
 /// What to compute a budget from.

@@ -1,36 +1,38 @@
 //! The top speed of a motor without a propeller, and what bounds it.
 //!
-//! The voltage is that of the machine's steady equations with no current along q; what the drive has of it, the most
-//! i_d and the fastest speed that samples follow are the control's own, as built from the parameters.
+//! The voltage is that of the machine's steady equations with no current along q. The most i_d, the speed where
+//! weakening ends and the fastest one that samples follow are the control's own, as built from the parameters for a
+//! board with three shunts. What the control has no public name for is repeated below, each with its place there;
+//! `test_top_speed.py` fails where one no longer is the control's.
 
 use std::f64::consts::{FRAC_2_PI, TAU};
 
 use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
+use siskin_control::control::six_step::duty::WHOLE;
+use siskin_control::control::voltage;
 use siskin_control::drive::Config;
 use siskin_control::image::Image;
 use siskin_control::params::choice::CtlMode;
 use siskin_control::params::{Board, BuildError, Greatest, LeastDeadTime, ParamId, Params, build};
-use siskin_control::units::Current;
+use siskin_control::units::{Current, Voltage};
 
-/// Fundamental of the voltage over the supply: of six-step, and of a vector to the hexagon's corners
-/// (`control::modulator`).
+/// Fundamental of the voltage over the supply: of six-step, by its waveform, and of a vector to the hexagon's corners
+/// (`LONGEST` of `control::modulator`).
 const SIX_STEP: f64 = FRAC_2_PI;
 const OVERMODULATED: f64 = 0.609;
 
-/// Share of the voltage that flux weakening uses; the rest keeps the current regulated (`control::weakening`).
+/// Share of that fundamental which flux weakening uses; the rest keeps the current regulated (`MARGIN` of
+/// `control::weakening`).
 const RESERVED: f64 = 0.98;
 
-/// Units of i_d for each turn a period that is left to the speed where weakening ends (`control::weakening`).
+/// Units of i_d for each turn a period that is left to the speed where weakening ends (`Config::weaken` of
+/// `control::weakening`).
 const TAPER: f64 = 128.0;
-
-/// Voltage of the full throttle over the length up to which every phase switches, where the flux may be weakened: the
-/// motor turns as if the supply had that (`control::voltage`).
-const FULL_THROTTLE: f64 = 1.5625;
 
 /// A speed that is not exceeded.
 pub(crate) struct Bound {
-    /// The parameter that sets it, or the supply.
+    /// The parameter that sets it, the supply or the throttle.
     pub(crate) name: &'static str,
     pub(crate) rpm: f64,
     /// What happens there.
@@ -110,9 +112,9 @@ impl Motor {
     /// Returns the speed at which the voltage is used up.
     fn bound(&self, config: &Config, supply_v: f64) -> Bound {
         let modulator = &config.modulator;
-        let share = if config.six_step.is_some() {
-            SIX_STEP
-        } else if modulator.over.vector_max > modulator.vector_max {
+        let share = if let Some(six_step) = &config.six_step {
+            SIX_STEP * six_step.whole.to_num::<f64>()
+        } else if overmodulates(config) {
             OVERMODULATED
         } else {
             modulator.vector_max.to_num()
@@ -131,12 +133,16 @@ impl Motor {
 
     /// Returns the speed that full throttle asks for in voltage mode.
     fn throttle(&self, config: &Config, supply_v: f64) -> Bound {
-        let share: f64 = config.modulator.vector_max.to_num();
-        let full = if weakens(config) { FULL_THROTTLE } else { 1.0 };
+        let switched: f64 = config.modulator.vector_max.to_num();
+        let beyond: f64 = if config.weakening.most > Current::ZERO {
+            voltage::beyond(WHOLE, Voltage::from_num(1.0)).to_num()
+        } else {
+            0.0
+        };
         Bound {
-            name: "CTL_MODE",
-            rpm: self.rpm(full * share * supply_v / self.flux_wb),
-            reason: "full throttle asks for its voltage",
+            name: "throttle",
+            rpm: self.rpm((1.0 + beyond) * switched * supply_v / self.flux_wb),
+            reason: "in voltage mode the full one asks for no more",
         }
     }
 
@@ -180,9 +186,14 @@ impl Motor {
     }
 }
 
-/// Returns whether the drive weakens the flux.
+/// Returns whether the longest vectors exceed the length up to which every phase switches.
+fn overmodulates(config: &Config) -> bool {
+    config.modulator.over.vector_max > config.modulator.vector_max
+}
+
+/// Returns whether the drive weakens the flux: only longer vectors tell it how much voltage is missing.
 fn weakens(config: &Config) -> bool {
-    config.six_step.is_none() && config.weakening.most > Current::ZERO
+    config.six_step.is_none() && config.weakening.most > Current::ZERO && overmodulates(config)
 }
 
 /// Returns a board whose sensors reach beyond the limits, so that it refuses nothing.

@@ -75,6 +75,14 @@ pub(crate) fn run(
     let supply_v = args
         .supply
         .unwrap_or_else(|| made.get(ParamId::LimBusVMax).into());
+    let (least_v, most_v) = (ParamId::LimBusVMin, ParamId::LimBusVMax);
+    let [least_v, most_v] = [least_v, most_v].map(|id| f64::from(made.get(id)));
+    if !(least_v..=most_v).contains(&supply_v) {
+        let why = format!(
+            "--supply {supply_v} is not within LIM_BUS_V_MIN, {least_v} V, and LIM_BUS_V_MAX, {most_v} V"
+        );
+        return Err(Error::Usage(why));
+    }
     let top_speed = TopSpeed::new(&params, supply_v);
     if args.json {
         let values = settings.iter().map(|setting| {
@@ -82,7 +90,9 @@ pub(crate) fn run(
             (name, json::number(setting.value))
         });
         let mut values: Map<_, _> = values.collect();
-        values.insert("top_speed".to_owned(), top_speed_json(&top_speed));
+        if args.top_speed {
+            values.insert("top_speed".to_owned(), top_speed_json(&top_speed));
+        }
         writeln!(out, "{}", Value::Object(values))?;
     } else {
         write!(out, "{}", table(&params, &made, &settings))?;
