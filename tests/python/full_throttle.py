@@ -33,8 +33,6 @@ LEAST = 0.97
 """Least share of the best speed."""
 LEAST_WRONG = 0.94
 """The same of a motor that is stated wrong."""
-
-
 LEAST_SIX_STEP = 0.93
 """The same in six-step."""
 SIX_STEP_HZ = 60_000
@@ -178,15 +176,15 @@ def main() -> int:
     motors = list(product(campaign.numbers(given), MODES))
     failed = 0
     print(f"{'motor':<14} {'mode':<8} {'wrong':>5} {'share':>6} {'current':>7}  faults, warnings")
-    cases = [(of_library, case, LEAST_WRONG if case[2] else LEAST) for case in benches]
-    cases += [(drawn, case, LEAST) for case in motors]
-    cases += [(in_six_step, (name,), LEAST_SIX_STEP) for name in PROPELLERS]
-    for (_, case, least), outcome in campaign.played(
+    # Each with the first columns of its row.
+    cases = [(of_library, case, case, LEAST_WRONG if case[2] else LEAST) for case in benches]
+    cases += [(drawn, case, (*case, 0), LEAST) for case in motors]
+    cases += [(in_six_step, (name,), (name, "six-step", 0), LEAST_SIX_STEP) for name in PROPELLERS]
+    for (_, _, (name, mode, wrong), least), outcome in campaign.played(
         cases, lambda folder, case: case[0](folder, *case[1]), given.jobs
     ):
         held = outcome.holds(least)
         failed += not held
-        name, mode, wrong = case if len(case) == 3 else (*case, "six-step", 0)[:2] + (0,)
         told = ", ".join(map(str, outcome.told + ["lost"] * outcome.lost))
         figures = f"{outcome.share:>6.3f} {outcome.current_share:>7.2f}"
         print(f"{name:<14} {mode:<8} {wrong:>5} {figures}  {'' if held else 'NO '}{told}".rstrip(), flush=True)
