@@ -27,7 +27,7 @@ pub use flux::FluxSettings;
 pub use input::input;
 pub(crate) use sensing::unbalance_max;
 pub use si::{BuildError, scale};
-use si::{Si, TEST_SHARE, TOO_FEW_PERIODS};
+use si::{OVERMODULATION_HZ, Si, TEST_SHARE, TOO_FEW_PERIODS};
 
 use super::board::{Board, TRIP_SHARE};
 use super::choice::{CtlDrive, CtlModulation, CtlObserver, Inp3d, LimPolicy, MotDir, MotStop};
@@ -52,10 +52,6 @@ const BUS_UNITS_MAX: f32 = 6.0;
 /// Time for which ξ̂ may stay at the end of its range, s: far longer than any transient that the observer recovers
 /// from.
 const LOST_S: f32 = 0.1;
-
-/// Electrical speed from which a phase may stay high, Hz: a driver of the first board's, which takes up to 0.2 mA, loses
-/// 0.4 V of its 1.6 µF's in the third of a turn.
-const OVERMODULATION_HZ: f32 = 100.0;
 
 /// Time for which zero throttle must hold before a fault clears, s.
 const CLEAR_S: f32 = 0.3;

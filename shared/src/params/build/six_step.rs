@@ -4,8 +4,8 @@ use core::f32::consts::TAU;
 
 use fixed::types::I1F31;
 
-use super::si::{Si, TEST_SHARE, TOO_FEW_PERIODS};
-use super::{OVERMODULATION_HZ, outer};
+use super::outer;
+use super::si::{OVERMODULATION_HZ, Si, TEST_SHARE, TOO_FEW_PERIODS};
 use crate::control::delay::Delay;
 use crate::control::sensing::Shunts;
 use crate::control::six_step::duty::WHOLE;
