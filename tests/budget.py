@@ -40,7 +40,7 @@ MEASURED = [
         "longest interrupt at its highest PWM",
         "share of the period",
         "modes",
-        r"^six-step, 38 kHz +full throttle +\d+ +\d+ +([\d.]+)$",
+        r"^six-step, 35 kHz +full throttle +\d+ +\d+ +([\d.]+)$",
         [("six-step at full throttle", "at most 0.70")],
     ),
     (

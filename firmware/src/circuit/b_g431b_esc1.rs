@@ -56,8 +56,8 @@ pub const RATING_A: f32 = 40.0;
 /// of the parameter's range.
 const SIX_STEP_BOUND: PwmBound = PwmBound {
     choice: (ParamId::CtlDrive, 1.0),
-    hz: 38_000.0,
-    refusal: "at most 38000 in six-step",
+    hz: 35_000.0,
+    refusal: "at most 35000 in six-step",
 };
 
 const FIELD_ORIENTED_BOUND: PwmBound = PwmBound {

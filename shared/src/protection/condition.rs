@@ -221,8 +221,8 @@ conditions! {
         "draws less: there is no more torque, and none at all just above `LIM_BUS_V_MIN`";
     /// The six-step drive's samples follow no faster motor.
     CommutationRate = 25 "commutation rate" Some(Raised::Alert),
-        "in six-step the motor is as fast as the samples can follow, an electrical turn in 21 periods of `PWM_FREQ_HZ`: with 7 pole pairs 9 800 rpm at 24 kHz, 15 500 rpm at 38 kHz"
-        "holds the speed there: raise `PWM_FREQ_HZ`, on the B-G431B-ESC1 to 38 kHz at most, or identify the motor, which is then driven field-oriented";
+        "in six-step the motor is as fast as the samples can follow, an electrical turn in 21 periods of `PWM_FREQ_HZ`: with 7 pole pairs 9 800 rpm at 24 kHz, 14 300 rpm at 35 kHz"
+        "holds the speed there: raise `PWM_FREQ_HZ`, on the B-G431B-ESC1 to 35 kHz at most, or identify the motor, which is then driven field-oriented";
 }
 
 impl Fault {
