@@ -7,14 +7,11 @@
 
 use std::f64::consts::{FRAC_2_PI, TAU};
 
-use siskin_control::control::delay::Delay;
-use siskin_control::control::sensing::Shunts;
 use siskin_control::control::six_step::duty::WHOLE;
 use siskin_control::control::voltage;
 use siskin_control::drive::Config;
-use siskin_control::image::Image;
 use siskin_control::params::choice::CtlMode;
-use siskin_control::params::{Board, BuildError, Greatest, LeastDeadTime, ParamId, Params, build};
+use siskin_control::params::{Board, BuildError, ParamId, Params, build};
 use siskin_control::units::{Current, Voltage};
 
 /// Fundamental of the voltage over the supply: of six-step, by its waveform, and of a vector to the hexagon's corners
@@ -196,23 +193,13 @@ fn weakens(config: &Config) -> bool {
     config.six_step.is_none() && config.weakening.most > Current::ZERO && overmodulates(config)
 }
 
-/// Returns a board whose sensors reach beyond the limits, so that it refuses nothing.
+/// Returns the emulator's board with sensors that reach beyond the limits, so that it refuses nothing.
 fn any_board(made: &Params) -> Board {
     let range_a = 2.0 * made.get(ParamId::LimPhaseA);
     Board {
-        image: Image::EMULATOR,
         current_a_per_count: range_a / 2048.0,
-        bus_v_per_count: 70.0 / 4096.0,
         current_range_a: range_a,
         greatest_phase: Board::greatest_phase(range_a),
-        greatest_supply: Greatest::ANY,
-        terminal_v_per_count: 70.0 / 4096.0,
-        shunts: Shunts::Three,
-        delay: Delay::One,
-        low_side_on_s: 1e-6,
-        refresh_s: 1e-6,
-        charge_s: 63e-6,
-        least_dead_time: LeastDeadTime::NONE,
-        pwm_bounds: &[],
+        ..Board::BENCH
     }
 }

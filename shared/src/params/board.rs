@@ -101,7 +101,7 @@ impl Board {
     }
 
     /// The sensors of the emulator's bench: 12 bits over ±40 A and 70 V.
-    pub(crate) const BENCH: Self = Self {
+    pub const BENCH: Self = Self {
         image: Image::EMULATOR,
         current_a_per_count: 40.0 / 2048.0,
         bus_v_per_count: 70.0 / 4096.0,
