@@ -24,7 +24,7 @@ macro_rules! parts {
         /// Interrupt of the edge capture timer.
         #[interrupt]
         fn $capture() {
-            capture::attend(wire::CAPTURE);
+            capture::attend(wire::CAPTURE, crate::tasks::throttle::end_reply);
         }
 
         type Edges = ([dma::Channel<'static>; 2], [dma::Request; 2]);

@@ -127,15 +127,26 @@ pub(super) struct Sending<'a> {
 }
 
 impl Sending<'_> {
-    /// Waits for the last bit and releases the pin within it, with the line already high. Returns the nominal
+    /// Waits for the last bit, within which the pin is released, with the line already high. Returns the nominal
     /// time of that: edges before it were the reply's own.
     pub(super) async fn end(self, capture: &mut Capture) -> u32 {
         capture.wait_until(self.over_ticks).await;
-        drive_pin(false);
-        PACE.cr1().modify(|w| w.set_cen(false));
-        // The counter has run on past the last word, and its unserved request stays pending until it is
-        // disabled: the next reply would start with it, whenever that is.
-        PACE.dier().write(|w| w.set_ude(false));
+        // If the time had passed before, there was no alarm.
+        end_reply();
         self.over_ticks
     }
+}
+
+/// Ends a reply whose time is over, if there is one. The capture timer's interrupt does so at each alarm: its task
+/// runs 4 µs later, and a flight controller may send its next frame 15 µs after the reply.
+#[inline(never)] // two callers
+pub(crate) fn end_reply() {
+    if !PACE.cr1().read().cen() {
+        return;
+    }
+    drive_pin(false);
+    PACE.cr1().modify(|w| w.set_cen(false));
+    // The counter has run on past the last word, and its unserved request stays pending until it is disabled: the
+    // next reply would start with it, whenever that is.
+    PACE.dier().write(|w| w.set_ude(false));
 }
