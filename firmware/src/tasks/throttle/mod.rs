@@ -31,7 +31,6 @@ use crate::edges::Edges;
 use crate::exchange::{SetpointWriter, SnapshotReader};
 pub(crate) use capture::Capture;
 pub(crate) use reply::Replier;
-pub(crate) use reply::end_reply;
 use reply::{Armed, Sending};
 
 /// Starts the task.

@@ -14,6 +14,7 @@ use embassy_stm32::pac::timer::vals::Urs;
 use siskin_control::answer::{Reply, gcr};
 
 use super::capture::Capture;
+use crate::board::end_reply;
 use crate::board::wire::{
     PACE, PACE_HZ, PaceTimer, TICK_HZ, drive_pin, level_register, level_word,
 };
@@ -135,18 +136,4 @@ impl Sending<'_> {
         end_reply();
         self.over_ticks
     }
-}
-
-/// Ends a reply whose time is over, if there is one. The capture timer's interrupt does so at each alarm: its task
-/// runs 4 µs later, and a flight controller may send its next frame 15 µs after the reply.
-#[inline(never)] // two callers
-pub(crate) fn end_reply() {
-    if !PACE.cr1().read().cen() {
-        return;
-    }
-    drive_pin(false);
-    PACE.cr1().modify(|w| w.set_cen(false));
-    // The counter has run on past the last word, and its unserved request stays pending until it is disabled: the
-    // next reply would start with it, whenever that is.
-    PACE.dier().write(|w| w.set_ude(false));
 }
