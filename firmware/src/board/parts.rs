@@ -24,21 +24,7 @@ macro_rules! parts {
         /// Interrupt of the edge capture timer.
         #[interrupt]
         fn $capture() {
-            capture::attend(wire::CAPTURE, end_reply);
-        }
-
-        /// Ends a reply whose time is over, if there is one. The capture timer's interrupt does so at each alarm: its
-        /// task runs 4 µs later, and a flight controller may send its next frame 15 µs after the reply.
-        #[inline(never)] // two callers
-        pub(crate) fn end_reply() {
-            if !wire::PACE.cr1().read().cen() {
-                return;
-            }
-            wire::drive_pin(false);
-            wire::PACE.cr1().modify(|w| w.set_cen(false));
-            // The counter has run on past the last word, and its unserved request stays pending until it is
-            // disabled: the next reply would start with it, whenever that is.
-            wire::PACE.dier().write(|w| w.set_ude(false));
+            capture::attend(wire::CAPTURE);
         }
 
         type Edges = ([dma::Channel<'static>; 2], [dma::Request; 2]);

@@ -19,9 +19,9 @@ static WAKER: AtomicWaker = AtomicWaker::new();
 /// An edge woke the task.
 static EDGE: AtomicBool = AtomicBool::new(false);
 
-/// Handles the timer's interrupt; at an alarm it first calls `at_alarm`.
+/// Handles the timer's interrupt.
 #[inline(always)] // one caller
-pub(crate) fn attend(timer: TimGp32, at_alarm: impl FnOnce()) {
+pub(crate) fn attend(timer: TimGp32) {
     let wanted = timer.dier().read();
     if !wanted.ccie(ALARM) {
         // Pended by an edge before the interrupts were disabled.
@@ -29,9 +29,6 @@ pub(crate) fn attend(timer: TimGp32, at_alarm: impl FnOnce()) {
     }
     // By now the DMA has read the edge's time, which cleared its flag: what is left is the alarm's.
     let alarm = timer.sr().read().ccif(ALARM);
-    if alarm {
-        at_alarm();
-    }
     EDGE.store(!alarm, Ordering::Relaxed);
     // Once is enough: the task re-enables them when it wants to be woken again.
     set_interrupts(timer, false, false);

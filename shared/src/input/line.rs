@@ -125,9 +125,8 @@ impl Line {
         if self.silent {
             return None;
         }
-        let believed = self.filter.settle(now_ticks);
-        if let Some(event) = believed.and_then(|edge| self.decode(edge)) {
-            return Some(event);
+        if let Some(edge) = self.filter.settle(now_ticks) {
+            return self.decode(edge);
         }
         if since(now_ticks, self.edge_at) >= self.tick_hz / 1000 * SILENCE_MS {
             // Well before the ticks wrap, after which a long level would look short.

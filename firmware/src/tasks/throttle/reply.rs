@@ -14,7 +14,6 @@ use embassy_stm32::pac::timer::vals::Urs;
 use siskin_control::answer::{Reply, gcr};
 
 use super::capture::Capture;
-use crate::board::end_reply;
 use crate::board::wire::{
     PACE, PACE_HZ, PaceTimer, TICK_HZ, drive_pin, level_register, level_word,
 };
@@ -128,12 +127,15 @@ pub(super) struct Sending<'a> {
 }
 
 impl Sending<'_> {
-    /// Waits for the last bit, within which the pin is released, with the line already high. Returns the nominal
+    /// Waits for the last bit and releases the pin within it, with the line already high. Returns the nominal
     /// time of that: edges before it were the reply's own.
     pub(super) async fn end(self, capture: &mut Capture) -> u32 {
         capture.wait_until(self.over_ticks).await;
-        // If the time had passed before, there was no alarm.
-        end_reply();
+        drive_pin(false);
+        PACE.cr1().modify(|w| w.set_cen(false));
+        // The counter has run on past the last word, and its unserved request stays pending until it is
+        // disabled: the next reply would start with it, whenever that is.
+        PACE.dier().write(|w| w.set_ude(false));
         self.over_ticks
     }
 }

@@ -24,7 +24,9 @@ fn behind_a_cut_frame_the_next_is_taken_at_once_when_its_rest_has_been_told() {
             // Nobody looks at the line until the next frame has come.
             wire.now_ns += 200_000;
             let bits = bits_of(&wire.edges(signal)).expect("a frame");
-            wire.line.settle(bits[0].0);
+            for _ in 0..2 {
+                wire.line.settle(bits[0].0);
+            }
             let event = wire.line.whole(signal.rests_high(), |bit| bits[bit]);
             let found = event.and_then(|event| event.signal());
             // After an odd number of edges the line is at the other level: they are taken one by one.
