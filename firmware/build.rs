@@ -9,7 +9,7 @@ fn main() {
     // Another commit is another image.
     println!("cargo::rerun-if-changed=../.git/logs/HEAD");
     println!("cargo::rerun-if-changed=src");
-    println!("cargo::rerun-if-changed=../shared/src");
+    println!("cargo::rerun-if-changed=../shared");
     println!("cargo::rustc-env=SISKIN_COMMIT={}", commit());
     println!("cargo::rustc-check-cfg=cfg(board)");
     let has = |feature: &str| env::var_os(format!("CARGO_FEATURE_{feature}")).is_some();

@@ -19,7 +19,7 @@ use siskin_control::params::{BOSSO_MOTOR, Board, BuildError, ParamId, Params};
 use siskin_control::record::Record;
 use siskin_control::store::{self, Integrity};
 use siskin_control::throttle::Throttle;
-use siskin_control::units::AdcCounts;
+use siskin_units::AdcCounts;
 use thiserror::Error;
 
 use crate::fault::{CHIP_V, Fault, Timeline};

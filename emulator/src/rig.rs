@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use siskin_control::control::delay::Delay;
 use siskin_control::drive::{self, Bridge, Config, Fault, Sample, Setpoint, Snapshot, State};
-use siskin_control::units::{Angle, Speed};
+use siskin_units::{Angle, Speed};
 
 pub use crate::bench::{Bench, Position};
 use crate::fault::InForce;

@@ -1,7 +1,7 @@
 //! Converts the control's numbers to the shaft's, whatever the configured direction.
 
 use siskin_control::drive::{Config, Direction};
-use siskin_control::units::{Scale, Speed};
+use siskin_units::{Scale, Speed};
 
 /// The units of the control's numbers on the bench, where a positive speed has the phases in the
 /// order a, b, c.

@@ -339,7 +339,7 @@ impl Motion {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
-    use siskin_control::units::Duty;
+    use siskin_units::Duty;
 
     use super::*;
     use crate::plant::{Fidelity, Gates};

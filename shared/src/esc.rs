@@ -2,6 +2,8 @@
 //! snapshots go in; set-points, frames and requests come out.
 
 use heapless::Vec;
+use siskin_units::Scale;
+use siskin_units::math::Real;
 
 use crate::answer::info::info;
 use crate::check::Check;
@@ -10,7 +12,6 @@ use crate::drive::Tracker;
 use crate::drive::{Config, CurrentMonitor, Drift, Phase, Setpoint, Snapshot};
 use crate::identify::Identify;
 use crate::input::authority::{Command, DriveStatus};
-use crate::math::Real;
 #[cfg(feature = "group")]
 use crate::mavlink::Four;
 use crate::mavlink::{Component, Context, Frame, NO_REBOOT_ARMED, Request, Warning};
@@ -21,7 +22,6 @@ use crate::statistics::Recorder;
 use crate::telemetry::{Charge, Telemetry};
 use crate::throttle::{LockThrottle, LockedAuthority, TaskDemands, Throttle};
 use crate::tune::Tune;
-use crate::units::Scale;
 use fit::Overrides;
 use storage::{Asker, Storage, Unstored};
 use tunes::Tunes;

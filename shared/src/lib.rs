@@ -1,5 +1,3 @@
-//! [`math`]: crate::math
-//! [`units`]: crate::units
 //! [`input`]: crate::input
 //! [`control`]: crate::control
 //! [`protection`]: crate::protection
@@ -20,10 +18,10 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Module order
-//! Dependencies run one way: `parts` ← {`trace`, `tune`, `checksum`, `image`} ← `math` ← {`units`, `input`} ← `control`
-//! ← `protection` ← `drive` ← {`params`, `statistics`} ← {`check`, `identify`, `record`, `setpoint`, `telemetry`}
-//! ← {`answer`, `mavlink`} ← {`throttle`, `store`} ← `esc`. Modules in the same braces do not use each other. A
-//! test enforces this order, and that every folder has a place in it.
+//! Dependencies run one way: `parts` ← {`tune`, `checksum`, `image`} ← {`input`, `control`} ← `protection` ← `drive`
+//! ← {`params`, `statistics`} ← {`check`, `identify`, `record`, `setpoint`, `telemetry`} ← {`answer`, `mavlink`}
+//! ← {`throttle`, `store`} ← `esc`. Modules in the same braces do not use each other. A test enforces this order,
+//! and that every folder has a place in it.
 //!
 //! # Inlining
 //! The chip build optimises for size, so the compiler inlines only what is no longer than a call. Every inline
@@ -50,7 +48,6 @@ pub mod esc;
 pub mod identify;
 pub mod image;
 pub mod input;
-pub mod math;
 pub mod mavlink;
 pub mod params;
 pub mod parts;
@@ -61,6 +58,4 @@ pub mod statistics;
 pub mod store;
 pub mod telemetry;
 pub mod throttle;
-pub mod trace;
 pub mod tune;
-pub mod units;

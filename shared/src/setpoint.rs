@@ -1,14 +1,15 @@
 //! Maps what is granted to the drive's set-point.
 
+use siskin_units::math::{Held, Real, TopProduct};
+use siskin_units::{Current, Scale, Speed};
+
 use crate::drive::Setpoint;
 use crate::drive::config::tone;
 use crate::input::authority::{Command, Demanded, Granted};
 use crate::input::{Share, reverse};
-use crate::math::{Held, Real, TopProduct};
 use crate::params::choice::CtlMode;
 use crate::params::{self, FromMotor, ParamId, Params};
 use crate::tune::Note;
-use crate::units::{Current, Scale, Speed};
 
 /// What the tasks may use the motor's phases for.
 #[derive(Clone, Copy, Debug, PartialEq)]

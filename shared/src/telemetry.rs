@@ -1,11 +1,12 @@
 //! The ESC's state in SI units.
 
+use siskin_units::Scale;
+use siskin_units::math::{SQRT_3, square_root};
+
 use crate::drive::{Faults, Limits, Phase, Snapshot};
 use crate::input::authority::{Command, DriveStatus};
 use crate::input::signal::Signal;
-use crate::math::{SQRT_3, square_root};
 use crate::statistics::Statistics;
-use crate::units::Scale;
 
 /// The ESC's state as telemetry reports it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -167,11 +168,12 @@ impl Default for Telemetry {
 
 #[cfg(test)]
 mod tests {
+    use siskin_units::Voltage;
+    use siskin_units::math::Real;
+
     use super::*;
     use crate::drive::State;
-    use crate::math::Real;
     use crate::params::{BOSSO_BENCH, Board, Params, build};
-    use crate::units::Voltage;
 
     #[test]
     fn a_day_of_short_times_is_not_lost() {

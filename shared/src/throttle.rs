@@ -7,6 +7,7 @@
 use core::mem::discriminant;
 
 use heapless::Vec;
+use siskin_units::Scale;
 
 use crate::answer::info;
 use crate::answer::{self, Answer, Answers, Ask, Basis, Reply, Serial};
@@ -20,7 +21,6 @@ use crate::input::{Heard, Input, News};
 use crate::params::{self, Board, Params, scale};
 use crate::setpoint::{Mapping, Use};
 use crate::telemetry::Telemetry;
-use crate::units::Scale;
 
 /// How long the tasks' demands on the drive hold, µs: tasks poll every millisecond, and a dead one must not
 /// turn a motor.

@@ -6,8 +6,8 @@ from collections import Counter
 from boards import Board, Region
 from image import Image
 
-OWN = ("siskin_control", "siskin_firmware")
-"""Crates broken down by module."""
+OWN = "siskin_"
+"""How the crates broken down by module begin."""
 
 
 def stored(image: Image, flash: Region) -> int:
@@ -31,7 +31,7 @@ def module(name: str) -> str:
         return raw.group(1)
     if len(parts) == 1:
         return "without a module"
-    return "::".join(parts[:2]) if parts[0] in OWN and len(parts) > 2 else parts[0]
+    return "::".join(parts[:2]) if parts[0].startswith(OWN) and len(parts) > 2 else parts[0]
 
 
 def by_module(image: Image, regions: list[Region]) -> list[tuple[str, list[int]]]:

@@ -44,7 +44,7 @@ def test_sizes_are_those_of_the_memories(tmp_path):
     ("name", "module"),
     [
         ("siskin_control::drive::step::step", "siskin_control::drive"),
-        ("<siskin_control::math::gain::Gain as core::cmp::PartialEq>::eq", "siskin_control::math"),
+        ("<siskin_units::math::gain::Gain as core::cmp::PartialEq>::eq", "siskin_units::math"),
         ("<&mut heapless::string::String as core::fmt::Write>::write_str", "heapless"),
         ("siskin_firmware::__cortex_m_rt_main", "siskin_firmware"),
         ("_RNvNtNtCs7NhdfSRABLd_17compiler_builtins3mem6memcpy", "compiler_builtins"),

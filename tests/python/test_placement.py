@@ -30,14 +30,14 @@ REQUIRED = {
 """Functions without which no image links."""
 
 OTHERS = {
-    ("siskin_control", "math", "gain", "parts"): (".once", 0x200),
+    ("siskin_units", "math", "gain", "parts"): (".once", 0x200),
     ("siskin_firmware", "interrupt", "pwm", "Pwm", "start"): (".once", 4),
     ("siskin_firmware", "interrupt", "pwm", "Pwm", "change"): (".once", 4),
     ("siskin_firmware", "interrupt", "pwm", "Pwm", "second"): (".control", 4),
     ("siskin_firmware", "interrupt", "leg", "Leg", "compare"): (".control", 4),
     ("siskin_firmware", "exchange", "ends", "ConfigWriter", "write"): (".once", 4),
     ("siskin_control", "drive", "foc", "outer_loop", "reference"): (".control", 0x1800),
-    ("siskin_control", "math", "root", "leg"): (".control_more", 0x800),
+    ("siskin_units", "math", "root", "leg"): (".control_more", 0x800),
     ("siskin_control", "drive", "foc", "period", "start"): (".control_rest", 0x5000),
     ("siskin_control", "control", "speed", "Config", "preset"): (".control_rest", 4),
     ("siskin_control", "params", "build", "build"): (".text", 4),

@@ -11,10 +11,10 @@ use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 use siskin_control::drive::Phase;
 use siskin_control::params::ParamId;
-use siskin_control::units::Speed;
 use siskin_emulator::bench::library;
 use siskin_emulator::device::Start;
 use siskin_emulator::scenario::stand;
+use siskin_units::Speed;
 use station::{HALF, Station, ZERO};
 
 const IDENTIFY: MavCmd = MavCmd::MAV_CMD_USER_1;

@@ -12,7 +12,7 @@ use siskin_control::control::voltage;
 use siskin_control::drive::Config;
 use siskin_control::params::choice::CtlMode;
 use siskin_control::params::{Board, BuildError, ParamId, Params, build};
-use siskin_control::units::{Current, Voltage};
+use siskin_units::{Current, Voltage};
 
 /// Fundamental of the voltage over the supply: of six-step, by its waveform, and of a vector to the hexagon's corners
 /// (`LONGEST` of `control::modulator`).

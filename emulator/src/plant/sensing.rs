@@ -5,7 +5,7 @@ use siskin_control::control::sensing::Shunts;
 use siskin_control::drive::Sample;
 use siskin_control::image::Image;
 use siskin_control::params::{Board, Greatest, LeastDeadTime};
-use siskin_control::units::AdcCounts;
+use siskin_units::AdcCounts;
 
 use super::Noise;
 use super::vector::{AXES, dot, phases, turn};

@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 use proptest::prelude::*;
 use siskin_control::drive::{Bridge, Setpoint};
 use siskin_control::params::{BOSSO_BENCH, Params, build};
-use siskin_control::units::Duty;
+use siskin_units::Duty;
 
 use super::*;
 use crate::fault::InForce;

@@ -1,7 +1,7 @@
 //! Temperatures.
 
 use siskin_control::protection::Ntc;
-use siskin_control::units::AdcCounts;
+use siskin_units::AdcCounts;
 
 use super::Winding;
 

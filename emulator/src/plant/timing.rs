@@ -1,7 +1,7 @@
 //! What a command asks of each leg's switches in half a period, and when.
 
 use siskin_control::drive::Bridge;
-use siskin_control::units::Duty;
+use siskin_units::Duty;
 
 use super::rail::Rail;
 

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use siskin_control::drive::Setpoint;
 use siskin_control::params::Params;
-use siskin_control::units::Scale;
+use siskin_units::Scale;
 
 use super::error::ScenarioError;
 use super::file::{RUN, Scenario, WindowTable};

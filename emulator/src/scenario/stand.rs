@@ -62,7 +62,7 @@ pub fn stand(base: &str, given: Table) -> Result<Standing, ScenarioError> {
 mod tests {
     use siskin_control::control::speed::Bounds;
     use siskin_control::params::{BOSSO_BENCH, Params, build};
-    use siskin_control::units::{Current, Speed};
+    use siskin_units::{Current, Speed};
 
     use super::*;
     use crate::bench::library;

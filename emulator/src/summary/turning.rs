@@ -1,7 +1,7 @@
 //! The shaft's motion against its command: turning back, reaching and settling.
 
 use siskin_control::drive::Setpoint;
-use siskin_control::units::{Current, Speed};
+use siskin_units::{Current, Speed};
 
 use super::since::Since;
 use crate::shaft::Units;
@@ -109,7 +109,7 @@ fn forward(setpoint: Setpoint) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use siskin_control::drive::Direction;
-    use siskin_control::units::Scale;
+    use siskin_units::Scale;
 
     use super::*;
 

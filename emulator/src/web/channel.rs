@@ -1,7 +1,7 @@
 //! The traced channels.
 
 use siskin_control::drive::{Bridge, Direction, Snapshot};
-use siskin_control::units::{Flux, Scale};
+use siskin_units::{Flux, Scale};
 
 use crate::record::Row;
 use crate::shaft::Units;

@@ -18,7 +18,7 @@ use embassy_stm32::timer::{Ch1, Ch2, Dma, UpDma};
 use embassy_stm32::usart::{self, Uart, UartTx};
 use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, rcc};
 use siskin_control::check::{Item, Kind, Own};
-use siskin_control::units::AdcCounts;
+use siskin_units::AdcCounts;
 
 use super::parts::parts;
 use super::wiring::{GateDriverPins, Slot, Wiring};

@@ -2,7 +2,7 @@
 
 use fixed::types::I1F31;
 use siskin_control::drive::{Excitation, Fault, Pull, Setpoint};
-use siskin_control::units::{Current, Speed};
+use siskin_units::{Current, Speed};
 
 /// Kind of set-point, in bits 31 to 29.
 const KIND_SHIFT: u32 = 29;

@@ -2,7 +2,7 @@
 
 use embassy_stm32::pac::timer::regs::{CcerAdv, CcmrOutputGp16};
 use embassy_stm32::pac::timer::vals::Ocm;
-use siskin_control::units::Duty;
+use siskin_units::Duty;
 
 use super::timing::compare;
 use crate::board::PHASES;

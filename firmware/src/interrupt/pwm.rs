@@ -21,7 +21,7 @@ use embassy_stm32::pac::timer::TimAdv;
 use embassy_stm32::pac::timer::regs::{Ccr1ch, SrAdv};
 use embassy_stm32::pac::timer::vals::{Bkp, Cms, Dir, FilterValue, Mms, Ossi, Ossr};
 use siskin_control::drive::Bridge;
-use siskin_control::units::Duty;
+use siskin_units::Duty;
 
 use super::leg::{Leg, Modes};
 use super::timing::{Timing, compare};

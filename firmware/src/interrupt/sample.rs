@@ -3,7 +3,7 @@
 use core::sync::atomic::Ordering;
 
 use siskin_control::drive::Sample;
-use siskin_control::units::AdcCounts;
+use siskin_units::AdcCounts;
 
 use super::registers::{Registers, Stand};
 use crate::board::WIRING;

@@ -1,8 +1,8 @@
 //! A drive's frequency and dead time in timer clocks.
 
 use siskin_control::drive::Config;
-use siskin_control::math::Real;
-use siskin_control::units::Duty;
+use siskin_units::Duty;
+use siskin_units::math::Real;
 
 /// Timer settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,12 +50,13 @@ const fn dead_time_code(clocks: u16) -> u8 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use siskin_control::control::delay::Delay;
     use siskin_control::control::sensing::Shunts;
     use siskin_control::params::{
         BOSSO_BENCH, Board, Greatest, LeastDeadTime, ParamId, Params, build,
     };
+
+    use super::*;
 
     /// Any board.
     const BOARD: Board = Board {

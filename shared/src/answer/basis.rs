@@ -1,9 +1,10 @@
 //! The part of the drive's configuration that answers need.
 
+use siskin_units::Scale;
+
 use crate::drive::config::six_step;
 use crate::drive::{ATTEMPTS, Fault, Snapshot};
 use crate::params;
-use crate::units::Scale;
 
 /// The parts of a [`Config`](crate::drive::Config) needed to interpret a snapshot.
 #[derive(Clone, Copy, Debug)]

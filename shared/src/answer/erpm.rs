@@ -3,7 +3,7 @@
 //! `eeemmmmmmmmm` is m·2^e µs. Betaflight and ArduPilot shift by e; some descriptions say e − 1 and are wrong.
 //! The mantissa is normalised: unless e is 0 its top bit is set, since words without it are extended telemetry.
 
-use crate::units::{Scale, Speed};
+use siskin_units::{Scale, Speed};
 
 /// The word for a standing shaft, or a period of 65.3 ms and more: below 919 eRPM.
 pub const STOPPED: u16 = 0xFFF;

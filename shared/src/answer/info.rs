@@ -16,9 +16,10 @@
 //! | 31 to 62 | name and board, zero-padded |
 //! | 63 | checksum, as in a KISS frame |
 
+use siskin_units::math::round;
+
 use super::kiss::crc8;
 use crate::image::{Image, VERSION};
-use crate::math::round;
 use crate::params::{ParamId, Params};
 
 /// Length in bytes.

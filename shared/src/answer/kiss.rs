@@ -1,6 +1,7 @@
 //! KISS telemetry on a serial line: 115200 baud, 8N1, ten bytes, big-endian.
 
-use crate::math::round;
+use siskin_units::math::round;
+
 use crate::telemetry::Telemetry;
 
 /// Bytes in a frame.

@@ -14,11 +14,12 @@ mod schedule;
 
 use core::num::NonZeroU32;
 
+use siskin_units::math::{quotient, round};
+
 use crate::drive::Snapshot;
 use crate::input::command::Order;
 use crate::input::dshot::Rate;
 use crate::input::line::Event;
-use crate::math::{quotient, round};
 use crate::telemetry::Telemetry;
 pub use basis::Basis;
 use extended::Extended;

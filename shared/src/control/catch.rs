@@ -31,10 +31,10 @@ use fixed::types::{I0F32, I4F28, I16F16, I17F15, I20F12};
 pub use state::{Config, LOOK_PERIODS, State};
 use state::{LOOK_SHIFT, SUM_FRACTION, Stage};
 
-use crate::math::{SinCos, TopProduct, atan2_turns};
-use crate::trace::Trace;
-use crate::units::{AdcCounts, Angle, QUARTER_TURN, Speed};
 use compare::Difference;
+use siskin_units::math::{SinCos, TopProduct, atan2_turns};
+use siskin_units::trace::Trace;
+use siskin_units::{AdcCounts, Angle, QUARTER_TURN, Speed};
 
 /// The highest reading that an observation needs to begin: three times the noise.
 const BEGIN: I17F15 = I17F15::lit("6");

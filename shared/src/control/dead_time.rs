@@ -8,10 +8,10 @@
 use fixed::FixedI32;
 use fixed::types::extra::{U22, U25};
 use fixed::types::{I2F30, I6F26, I8F24, I12F20};
+use siskin_units::Current;
+use siskin_units::math::{Gain, SinCos, TopSum};
 
 use super::transform::{Dq, rotate};
-use crate::math::{Gain, SinCos, TopSum};
-use crate::units::Current;
 
 /// A share of the supply voltage.
 pub type Share = FixedI32<U22>;
@@ -79,10 +79,11 @@ const CERTAIN: i32 = 1 << 24;
 
 #[cfg(test)]
 mod tests {
+    use siskin_units::Angle;
+    use siskin_units::math::sin_cos;
+
     use super::*;
     use crate::control::transform::{AlphaBeta, inverse_park, phases};
-    use crate::math::sin_cos;
-    use crate::units::Angle;
     use core::f64::consts::TAU;
 
     /// 0.5 µs of 66.7 µs, in full from 0.3 units of current up.

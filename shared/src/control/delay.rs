@@ -1,7 +1,8 @@
 //! The delay from a sample to the voltage computed from it.
 
+use siskin_units::{Angle, Speed, Voltage};
+
 use crate::parts;
-use crate::units::{Angle, Speed, Voltage};
 
 /// Control periods from a sample to the voltage computed from it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

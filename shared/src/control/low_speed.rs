@@ -4,9 +4,10 @@
 //! At low speed the back-EMF is small against the unknowns: the dead time's loss around zero current, and the drop
 //! across a resistance that may be stated wrongly.
 
+use siskin_units::math::{Gain, Held};
+use siskin_units::{Current, Speed};
+
 use super::speed::Bounds;
-use crate::math::{Gain, Held};
-use crate::units::{Current, Speed};
 
 /// The current along d, and the bound of the one along q.
 #[derive(Clone, Debug, Default, PartialEq)]

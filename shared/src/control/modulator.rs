@@ -5,17 +5,18 @@ use crate::control::dead_time::Share;
 use fixed::types::extra::U20;
 use fixed::types::{I0F32, I1F31, I8F24};
 
-use super::dead_time;
-use super::sensing::Shunts;
-use super::transform::{AlphaBeta, Dq, PhaseOrder, phases_in};
-use crate::math::{Held, Multiplier, Quantity, Real, SQRT_3, TopProduct, TopSum, other_leg};
-use crate::parts;
-use crate::trace::traced;
-use crate::units::dimension::Volt;
-use crate::units::{
+use siskin_units::dimension::Volt;
+use siskin_units::math::{Held, Multiplier, Quantity, Real, SQRT_3, TopProduct, TopSum, other_leg};
+use siskin_units::traced;
+use siskin_units::{
     Duty, InverseVoltage, Speed, TurnedVoltage, Voltage, VoltageSquare, WideVoltage,
     WideVoltageSquare, wide,
 };
+
+use super::dead_time;
+use super::sensing::Shunts;
+use super::transform::{AlphaBeta, Dq, PhaseOrder, phases_in};
+use crate::parts;
 
 /// The choice of common-mode voltage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,11 +9,11 @@
 //! conversion", Proc. IEEE 82 (1994), section IV.
 
 use fixed::types::I1F31;
+use siskin_units::math::TopProduct;
+use siskin_units::{Duty, TurnedVoltage, Voltage};
 
 use super::modulator::{Config, Phases, whole, whole_duty};
 use super::transform::AlphaBeta;
-use crate::math::TopProduct;
-use crate::units::{Duty, TurnedVoltage, Voltage};
 
 /// More of the period than this beyond the largest duty, 0.4 %, makes the highest phase stay high: not a rounding.
 const NO_LONGER: I1F31 = I1F31::from_bits(1 << 23);
@@ -107,12 +107,13 @@ pub fn beyond_hexagon(
 
 #[cfg(test)]
 mod tests {
+    use siskin_units::Speed;
+
     use super::*;
     use crate::control::dead_time;
     use crate::control::modulator::{Modulation, Supply};
     use crate::control::sensing::Shunts::{self, Three, Two};
     use crate::control::transform::PhaseOrder;
-    use crate::units::Speed;
     use core::f64::consts::TAU;
 
     const MOST: f64 = 0.95;

@@ -5,9 +5,9 @@
 //! follows a command that moves within the slew without lag. The slew builds up over some
 //! milliseconds, so its torque is no step for the current loop.
 
-use crate::math::{Gain, Held};
-use crate::trace::traced;
-use crate::units::Speed;
+use siskin_units::Speed;
+use siskin_units::math::{Gain, Held};
+use siskin_units::traced;
 
 /// Limits of the trajectory.
 #[derive(Clone, Debug, Default, PartialEq)]

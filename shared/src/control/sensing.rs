@@ -8,9 +8,9 @@
 
 use fixed::types::I16F16;
 
-use crate::math::Held;
-use crate::trace::traced;
-use crate::units::{AdcCounts, Duty};
+use siskin_units::math::Held;
+use siskin_units::traced;
+use siskin_units::{AdcCounts, Duty};
 
 /// Which phases have a shunt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -5,14 +5,14 @@
 //! hand-over it knows the rotor's actual position.
 
 use fixed::types::extra::U28;
-
-use super::transform::Dq;
-use crate::math::{Gain, Held, Quantity, TopProduct};
-use crate::trace::traced;
-use crate::units::dimension::TurnPerPeriod;
-use crate::units::{
+use siskin_units::dimension::TurnPerPeriod;
+use siskin_units::math::{Gain, Held, Quantity, TopProduct};
+use siskin_units::traced;
+use siskin_units::{
     Angle, Charge, Current, CurrentRate, InverseFlux, QUARTER_TURN, Speed, Voltage,
 };
+
+use super::transform::Dq;
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -180,9 +180,10 @@ const YIELD_ANGLE_MAX: Angle = Angle::from_bits(1 << 28);
 
 #[cfg(test)]
 mod tests {
+    use siskin_units::math::sin_cos;
+
     use super::*;
     use crate::control::transform::inverse_park;
-    use crate::math::sin_cos;
 
     fn config() -> Config {
         Config {

@@ -6,6 +6,8 @@
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
+use siskin_units::{Angle, Current, InverseFlux, Speed, Torque, Voltage, WideVoltage};
+
 use super::delay::Delay;
 use super::inductance::Factor;
 use super::observer::{self, back_emf};
@@ -14,7 +16,6 @@ use super::transform::Dq;
 use crate::drive::Config;
 use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
 use crate::parts;
-use crate::units::{Angle, Current, InverseFlux, Speed, Torque, Voltage, WideVoltage};
 
 mod inductance;
 mod motor;

@@ -3,11 +3,12 @@
 //! Voltage mode and tests go through it too. i_q* takes a few milliseconds across its range: at speed the current
 //! loop overshoots a step by half, and a 40 A step would end in the over-current trip.
 
+use siskin_units::Current;
+use siskin_units::math::Held;
+use siskin_units::traced;
+
 use super::regulator::Reference;
 use super::speed::Bounds;
-use crate::math::Held;
-use crate::trace::traced;
-use crate::units::Current;
 
 /// Limits of the change.
 #[derive(Clone, Debug, Default, PartialEq)]

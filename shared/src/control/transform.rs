@@ -2,9 +2,10 @@
 
 use fixed::types::{I0F32, I1F31};
 
-use crate::math::{Held, Number, SinCos, TopProduct, TopSum};
-use crate::trace::{Trace, traced};
-use crate::units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage};
+use siskin_units::math::{Held, Number, SinCos, TopProduct, TopSum};
+use siskin_units::trace::Trace;
+use siskin_units::traced;
+use siskin_units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage};
 
 traced! {
     /// A vector in the stator's frame.
@@ -178,9 +179,10 @@ where
 
 #[cfg(test)]
 mod tests {
+    use siskin_units::Angle;
+    use siskin_units::math::sin_cos;
+
     use super::*;
-    use crate::math::sin_cos;
-    use crate::units::Angle;
     use core::f64::consts::TAU;
 
     /// Three readings of a balanced vector of this amplitude and angle.

@@ -7,11 +7,11 @@
 //! bound overrides the command, in braking too.
 
 use fixed::types::I1F31;
+use siskin_units::math::{Held, TopProduct};
+use siskin_units::{Current, Voltage};
 
 use super::regulator::{self, Feedback, Reference};
 use super::transform::Dq;
-use crate::math::{Held, TopProduct};
-use crate::units::{Current, Voltage};
 
 /// Returns the voltage for a share, −1 to 1, of the length up to which every phase switches.
 pub fn of_share(share: I1F31, vector_max: Voltage) -> Voltage {

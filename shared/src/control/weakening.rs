@@ -4,12 +4,13 @@
 //! synchronous motor drive for the flux weakening operation", IEEE Trans. Ind. Appl. 33 (1997). While voltage is
 //! missing i_d falls, with voltage to spare it returns to zero: below the speed where the supply binds there is none.
 
+use siskin_units::math::{Held, Multiplier, other_leg};
+use siskin_units::traced;
+use siskin_units::{Current, Speed, Voltage, WideVoltage, stated_emf, wide};
+
 use super::modulator::VectorLimit;
 use super::speed::Bounds;
 use super::transform::Dq;
-use crate::math::{Held, Multiplier, other_leg};
-use crate::trace::traced;
-use crate::units::{Current, Speed, Voltage, WideVoltage, stated_emf, wide};
 
 /// Periods between steps.
 pub const PERIODS: u32 = 16;

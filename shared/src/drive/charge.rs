@@ -1,9 +1,10 @@
 //! Charge: the low sides charge the supplies of the high-side drivers before the phases switch.
 
+use siskin_units::traced;
+
 use super::config::Config;
 use super::seen::Seen;
 use crate::control::catch::Rotor;
-use crate::trace::traced;
 
 traced! {
     /// State of Charge.

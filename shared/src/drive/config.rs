@@ -5,15 +5,16 @@ pub mod tone;
 
 use core::mem::MaybeUninit;
 
+use siskin_units::math::{Gain, Multiplier};
+use siskin_units::{AdcCounts, Current, Duty, Scale, Speed, Voltage, WideVoltage};
+
 use crate::control::delay::Delay;
 use crate::control::{
     catch, dead_time, inductance, low_speed, modulator, observer, regulator, sensing, speed, start,
     torque, weakening,
 };
-use crate::math::{Gain, Multiplier};
 use crate::parts;
 use crate::protection;
-use crate::units::{AdcCounts, Current, Duty, Scale, Speed, Voltage, WideVoltage};
 
 /// Direction of rotation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -11,10 +11,11 @@
 //!   passes through at least one switch of its own. A direction that has not conducted in several turns, wherever the
 //!   rotor was, means an open wire or a switch that does not turn on.
 
+use siskin_units::math::Held;
+use siskin_units::{AdcCounts, Angle, Current, QUARTER_TURN};
+
 use super::snapshot::Snapshot;
-use crate::math::Held;
 use crate::protection::{Limit, Limits};
-use crate::units::{AdcCounts, Angle, Current, QUARTER_TURN};
 
 /// What the currents have shown since the motor rested.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -12,10 +12,11 @@
 //! The estimates are clamped to the range that heat and a wrongly stated motor can explain. They change no parameter, and
 //! are forgotten without power.
 
+use siskin_units::math::Real;
+use siskin_units::{Current, FLUX_NOMINAL, stated_emf};
+
 use super::phase::Phase;
 use super::snapshot::Snapshot;
-use crate::math::Real;
-use crate::units::{Current, FLUX_NOMINAL, stated_emf};
 
 /// A motor's resistance and flux over those that the parameters state.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -212,10 +213,11 @@ fn product(a: &[f32; 3], b: &[f32; 3]) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use siskin_units::{Flux, Speed, Voltage};
+
     use super::*;
     use crate::drive::State;
     use crate::params::{BOSSO_BENCH, Board, Params, build};
-    use crate::units::{Flux, Speed, Voltage};
 
     /// The first paper's motor on the bench: 26.7 A and 49 V are a unit.
     const STATED: Stated = Stated {

@@ -1,8 +1,9 @@
 //! The identification's excitation of a standing motor's windings.
 
+use siskin_units::Current;
+use siskin_units::traced;
+
 use crate::parts::Identification;
-use crate::trace::traced;
-use crate::units::Current;
 
 traced! {
     /// Direction of the square wave.

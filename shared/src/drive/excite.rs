@@ -9,6 +9,9 @@
 //! Throughout, each phase's voltage keeps the sign of its current: the dead time's effect is constant, and the
 //! difference between two currents yields R without it.
 
+use siskin_units::traced;
+use siskin_units::{AdcCounts, Angle, Current, Duty, Speed, Voltage};
+
 use super::config::Config;
 use super::excitation::{Excitation, Ripple};
 use super::io::Bridge;
@@ -18,8 +21,6 @@ use super::shared::Shared;
 use crate::control::delay::Delay;
 use crate::control::modulator;
 use crate::control::transform::{AlphaBeta, Dq, clarke};
-use crate::trace::traced;
-use crate::units::{AdcCounts, Angle, Current, Duty, Speed, Voltage};
 
 /// log2 of the supply voltage over a voltage's change per period.
 const STEP_SHIFT: u32 = 15;

@@ -1,11 +1,11 @@
 //! Inputs and output of a control period: sample, set-point, bridge.
 
 use fixed::types::I1F31;
+use siskin_units::{AdcCounts, Current, Duty, Speed};
 
 use super::excitation::Excitation;
 use super::pull::Pull;
 use crate::protection::Fault;
-use crate::units::{AdcCounts, Current, Duty, Speed};
 
 /// The ADC readings of one control period.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,9 @@
 //! Which limits are active, from a snapshot. Runs in the tasks, not the interrupt.
 
+use siskin_units::{Current, Speed, Voltage};
+
 use super::snapshot::Snapshot;
 use crate::protection::{Limit, Limits};
-use crate::units::{Current, Speed, Voltage};
 
 /// Thresholds at which limits count as active, in the control's units.
 #[derive(Clone, Copy, Debug)]

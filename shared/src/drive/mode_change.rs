@@ -1,5 +1,7 @@
 //! The mode change that a set-point asks for.
 
+use siskin_units::Speed;
+
 use super::config::{Config, Stop};
 use super::foc::{begin, brake};
 use super::io::{Rotation, Setpoint};
@@ -9,7 +11,6 @@ use super::six_step;
 use super::state::State;
 use super::transitions::Why;
 use crate::control::catch::Rotor;
-use crate::units::Speed;
 
 /// Returns the reason why the present mode ends, if the set-point asks for another.
 pub(super) fn mode_change(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Why> {
@@ -56,7 +57,7 @@ fn at_rest(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Wh
         _ => false,
     };
     let drives = setpoint.rotation(config.both_ways) != Rotation::Rest;
-    let stands = state.off.rotor == Rotor::Standing;
+    let stands = matches!(state.off.rotor, Rotor::Standing);
     match state.phase {
         Phase::Tone | Phase::Sense if wants_tone => None,
         // A test charges what it needs itself, and must find a short before all low sides turn on.

@@ -4,6 +4,9 @@
 //! The field-oriented drive catches a turning rotor where it is, stops one that turns the other way first, follows a
 //! slow one, and parks a standing one. Six-step seeks the rotor by turning it.
 
+use siskin_units::Speed;
+use siskin_units::traced;
+
 use super::config::{Config, Direction};
 use super::io::Sample;
 use super::shared::Shared;
@@ -11,8 +14,6 @@ use super::transitions::Why;
 use crate::control::catch::{self, Rotor};
 use crate::control::sensing::{self, Zeroing};
 use crate::protection::Fault;
-use crate::trace::traced;
-use crate::units::Speed;
 
 /// Offset measurements without knowing whether the rotor turns: after eight times 5 ms it is too slow to matter, or
 /// its terminals cannot be read.

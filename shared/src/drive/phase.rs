@@ -1,6 +1,6 @@
 //! Phases of the drive.
 
-use crate::trace::Trace;
+use siskin_units::trace::Trace;
 
 /// A phase of the drive (start-up: second paper, section 3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! The half-bridges that a self-test pulls.
 
-use crate::trace::Trace;
+use siskin_units::trace::Trace;
 
 /// Which half-bridge a self-test pulls to which supply rail.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -2,12 +2,13 @@
 //!
 //! Its phase is the one these values belong to; the drive's own, `State::phase`, may already be the next.
 
+use siskin_units::math::TopProduct;
+use siskin_units::traced;
+use siskin_units::{AdcCounts, Angle, Current, Speed, Voltage};
+
 use super::phase::Phase;
 use crate::control::modulator::Supply;
 use crate::control::transform::Dq;
-use crate::math::TopProduct;
-use crate::trace::traced;
-use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
 
 traced! {
     /// The last period's quantities.

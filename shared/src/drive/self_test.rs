@@ -7,14 +7,15 @@
 //! comparator on that leg's shunt, or the gate driver. The last current remains readable, at one period's pace or
 //! slower.
 
+use siskin_units::traced;
+use siskin_units::{AdcCounts, Duty};
+
 use super::config::Config;
 use super::io::Bridge;
 use super::pull::Pull;
 use super::seen::{greatest, reading};
 use super::shared::Shared;
 use crate::control::transform::Dq;
-use crate::trace::traced;
-use crate::units::{AdcCounts, Duty};
 
 /// Periods in which the duty rises to full.
 const RISE_PERIODS: u16 = 256;

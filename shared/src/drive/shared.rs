@@ -1,5 +1,9 @@
 //! State that every mode uses and none owns: protection, current offsets, faults, applied duties.
 
+use siskin_units::math::Held;
+use siskin_units::traced;
+use siskin_units::{AdcCounts, Duty, Speed, Voltage};
+
 use super::config::{ATTEMPTS, Config, Direction, QUICK_ATTEMPTS};
 use super::io::{Rotation, Sample, Setpoint};
 use super::phase::Phase;
@@ -8,10 +12,7 @@ use super::transitions::Why;
 use crate::control::delay::Delay;
 use crate::control::modulator::Supply;
 use crate::control::sensing::{self, Shunts};
-use crate::math::Held;
 use crate::protection::{self, Fault, Faults};
-use crate::trace::traced;
-use crate::units::{AdcCounts, Duty, Speed, Voltage};
 
 traced! {
     /// State that every mode uses.

@@ -1,10 +1,11 @@
 //! A copy of the control's state variables for the tasks.
 
+use siskin_units::{AdcCounts, Angle, Current, Flux, Speed, Voltage};
+
 use super::phase::Phase;
 use crate::control::speed::Bounds;
 use crate::control::transform::Dq;
 use crate::protection::Faults;
-use crate::units::{AdcCounts, Angle, Current, Flux, Speed, Voltage};
 
 /// The control's state variables for the tasks, copied out of the interrupt.
 #[derive(Clone, Copy, Debug, PartialEq)]

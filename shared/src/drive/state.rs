@@ -1,5 +1,8 @@
 //! The drive's state from period to period: each mode's, and the shared one.
 
+use siskin_units::trace::Trace;
+use siskin_units::{AdcCounts, Angle, Flux, Speed};
+
 use super::config::Config;
 use super::io::{Bridge, Setpoint};
 use super::phase::Phase;
@@ -9,8 +12,6 @@ use super::transitions::{Why, next};
 use super::{charge, excite, foc, off, schedule, self_test, six_step, tone};
 use crate::control::{inductance, observer};
 use crate::protection::Fault;
-use crate::trace::Trace;
-use crate::units::{AdcCounts, Angle, Flux, Speed};
 
 /// No kind of set-point.
 const NO_KIND: u8 = u8::MAX;

@@ -1,5 +1,7 @@
 //! The control period, from top to bottom.
 
+use siskin_units::AdcCounts;
+
 use super::config::Config;
 use super::foc::period::period;
 use super::foc::{begin, brake, open_loop, outer_loop};
@@ -11,7 +13,6 @@ use super::state::State;
 use super::transitions::Why;
 use super::{charge, excite, off, self_test, six_step, tone};
 use crate::protection::{self, Fault};
-use crate::units::AdcCounts;
 
 /// One control period: from the sample to what the bridge does in the next period.
 ///

@@ -4,9 +4,10 @@
 use std::f64::consts::TAU;
 use std::vec::Vec;
 
+use siskin_units::{AdcCounts, Current, Speed};
+
 use super::*;
 use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
-use crate::units::{AdcCounts, Current, Speed};
 
 mod any;
 mod at_rest;

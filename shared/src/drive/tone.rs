@@ -14,6 +14,10 @@
 //! true one, but learned: it starts at the lesser of what each alone would need, and doubles where twice as much
 //! has not produced the current. What both as stated would need is the maximum.
 
+use siskin_units::math::{Held, SinCos, TopProduct, magnitude};
+use siskin_units::traced;
+use siskin_units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage, WideVoltage, wide};
+
 use super::config::Config;
 use super::config::tone::{self, PITCH_MAX};
 use super::io::Bridge;
@@ -23,9 +27,6 @@ use super::seen::{Seen, bus_current, greatest, reading};
 use super::shared::Shared;
 use crate::control::modulator::{self, Supply};
 use crate::control::transform::{AlphaBeta, Dq};
-use crate::math::{Held, SinCos, TopProduct, magnitude};
-use crate::trace::traced;
-use crate::units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage, WideVoltage, wide};
 
 /// The smallest voltage assumed for a current, as a right shift of the dead time's: crossing the latter in steps of
 /// a quarter of the former takes some 30 half cycles.

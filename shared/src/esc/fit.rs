@@ -2,9 +2,10 @@
 
 use core::mem::MaybeUninit;
 
+use siskin_units::Scale;
+
 use crate::drive::{Config, Drift, put_default};
 use crate::params::{Board, BuildError, ParamId, Params, build_in, scale};
-use crate::units::Scale;
 
 /// Values the drive runs with in place of the parameters.
 #[derive(Clone, Copy, Debug)]

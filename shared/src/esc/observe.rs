@@ -1,8 +1,9 @@
 //! Takes in what the drive and the board show at each poll: temperature, limits, consumption and statistics.
 
+use siskin_units::math::magnitude;
+
 use super::Esc;
 use crate::drive::Snapshot;
-use crate::math::magnitude;
 use crate::params::{ParamId, thresholds, unbalance_max};
 use crate::statistics::Inputs;
 

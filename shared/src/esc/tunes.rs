@@ -1,8 +1,9 @@
 //! Tunes that the motor plays, and when it may.
 
+use siskin_units::Speed;
+
 use crate::drive::Snapshot;
 use crate::tune::{Note, Player, Tune};
-use crate::units::Speed;
 
 /// The tune being played.
 #[derive(Clone, Debug, Default)]

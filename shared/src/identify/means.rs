@@ -2,9 +2,10 @@
 
 use core::f32::consts::TAU;
 
+use siskin_units::Scale;
+use siskin_units::math::Real;
+
 use crate::drive::Snapshot;
-use crate::math::Real;
-use crate::units::Scale;
 
 /// Polls averaged for an excitation.
 pub(super) const EXCITED_POLLS: u16 = 150;

@@ -2,10 +2,11 @@
 
 use core::f32::consts::TAU;
 
+use siskin_units::Scale;
+use siskin_units::math::{SQRT_3, square_root};
+
 use super::means::{OperatingPoint, seconds};
 use super::report::{Figure, Motor, Report};
-use crate::math::{SQRT_3, square_root};
-use crate::units::Scale;
 
 /// The speed of the runs: over what the supply can reach, and in turns per period.
 const RUN_SHARE: f32 = 0.4;

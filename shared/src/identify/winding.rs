@@ -1,8 +1,9 @@
 //! R and L from the means of the excitations.
 
+use siskin_units::Scale;
+
 use super::means::OperatingPoint;
 use super::report::{Figure, Motor, Report};
-use crate::units::Scale;
 
 /// Greatest deviation of a phase's R from the mean, and of L likewise: a salient rotor's axes differ.
 const R_SPREAD: f32 = 0.1;

@@ -10,6 +10,8 @@
 //! 2170 then turns the motor; opening on the first throttle frame would let 57 of 100 turn it. A pulse has no
 //! checksum; that it is like the one before is its check.
 
+use siskin_units::math::Real;
+
 use super::Share;
 use super::command::within;
 use super::demand::Reading;
@@ -17,7 +19,6 @@ use super::endpoints::Demand;
 use super::event::{Event, Likeness};
 use super::signal::Signal;
 use super::trust::Trust;
-use crate::math::Real;
 
 /// The minimum number of zero-throttle frames that arm a wire.
 const ARMING_FRAMES: u32 = 30;

@@ -9,8 +9,9 @@
 //! Repeating the sequence right after one from power-up, with the stick up within two seconds, requests
 //! identification of the motor.
 
+use siskin_units::math::quotient;
+
 use super::endpoints::EndPoints;
-use crate::math::quotient;
 
 /// Servo pulses accepted as full throttle, ns: what transmitters and flight controllers send at that end, 1900 to 2020
 /// µs, with a margin. A stick that is merely high, or the centre of a two-direction one, must not start a calibration.

@@ -6,10 +6,11 @@
 
 use core::num::NonZeroU32;
 
+use siskin_units::math::quotient;
+
 use super::dshot::{Frame, Rate, check_mask};
 use super::event::Event;
 use super::filter::{Edge, since};
-use crate::math::quotient;
 
 /// Edges in a frame: two per bit.
 const EDGES: u8 = 32;

@@ -1,8 +1,9 @@
 //! Maps a pulse's width to throttle.
 
+use siskin_units::math::quotient;
+
 use super::signal::Pulse;
 use super::{Share, reverse};
-use crate::math::quotient;
 
 const NS_PER_US: u32 = 1000;
 

@@ -1,5 +1,7 @@
 //! Decodes one throttle wire: timed edges in, frames and pulses out.
 
+use siskin_units::math::quotient;
+
 use super::capture;
 use super::detect::Detector;
 use super::dshot::Rate;
@@ -7,7 +9,6 @@ pub use super::event::Event;
 use super::filter::{Edge, Filter, since};
 use super::pulse;
 use super::signal::{Pulse, Signal};
-use crate::math::quotient;
 
 /// Without an edge for this long a line is at rest, whatever it carried. At 50 Hz pulses leave 19 ms.
 const SILENCE_MS: u32 = 100;

@@ -3,9 +3,10 @@
 //! A pulse has no checksum. Its width, the time since the previous one, and a valid pulse before it tell it
 //! from other edges; those that are like it in width and in time tell a sender from noise.
 
+use siskin_units::math::quotient;
+
 use super::event::{Event, Likeness};
 use super::signal::Pulse;
-use crate::math::quotient;
 
 /// The minimum period of Multishot, ns: 32 kHz, 5 % fast and 5 % early. DShot150's bits are as wide as
 /// Multishot's pulses, but come every 7 µs.

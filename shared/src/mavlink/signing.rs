@@ -15,9 +15,9 @@
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::SETUP_SIGNING_DATA;
 use sha2::{Digest, Sha256};
+use siskin_units::math::divide;
 
 use super::frame::{Address, Frame, SIGNATURE_LEN, is_signed};
-use crate::math::divide;
 
 const TIMESTAMP_LEN: usize = 6;
 const HASH_LEN: usize = 6;

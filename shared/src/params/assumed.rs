@@ -5,10 +5,11 @@
 
 use core::f32::consts::TAU;
 
+use siskin_units::math::SQRT_3;
+
 use super::choice::{CtlDrive, CtlMode};
 use super::table::{Choice, ParamId};
 use super::values::Params;
-use crate::math::SQRT_3;
 
 /// Pole pairs of most small motors: 12 slots, 14 magnets.
 pub(crate) const POLE_PAIRS: f32 = 7.0;

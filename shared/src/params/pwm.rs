@@ -2,10 +2,11 @@
 
 use core::f32::consts::{FRAC_PI_2, TAU};
 
+use siskin_units::math::SQRT_3;
+
 use super::choice::CtlMode;
 use super::table::ParamId;
 use super::values::Params;
-use crate::math::SQRT_3;
 
 /// PWM periods per electrical turn at `CTL_RPM_MAX`.
 const TURN_PERIODS: f32 = 20.0;

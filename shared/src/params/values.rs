@@ -1,9 +1,10 @@
 //! The values of the parameters, and why one is rejected.
 
+use siskin_units::math::{SQRT_3, round};
+
 use super::board::Board;
 use super::preset::Preset;
 use super::table::{Choice, Kind, ParamId, TABLE};
-use crate::math::{SQRT_3, round};
 
 /// Why a value was rejected.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 //! The listings below are the single source of numbers, names, flags and of the pilot's page in
 //! `firmware/README.md`, which a test compares with [`Condition`]'s rows.
 
-use crate::trace::Trace;
+use siskin_units::trace::Trace;
 
 /// A condition's entry on the pilot's page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

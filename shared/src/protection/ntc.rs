@@ -1,7 +1,7 @@
 //! Temperature from a thermistor reading.
 
-use crate::math::{Real, logarithm};
-use crate::units::AdcCounts;
+use siskin_units::AdcCounts;
+use siskin_units::math::{Real, logarithm};
 
 /// Counts of a 12-bit ADC.
 const COUNTS: f32 = 4096.0;

@@ -7,9 +7,9 @@ use siskin_control::answer::{Ask, REPLY_DELAY_NS, gcr, kiss};
 use siskin_control::drive::Phase;
 use siskin_control::input::dshot::{Frame, edges};
 use siskin_control::input::signal::{Pulse, Signal};
-use siskin_control::units::Speed;
 use siskin_fuzz::bytes::Bytes;
 use siskin_fuzz::desk::{CAPTURE_HZ, Desk};
+use siskin_units::Speed;
 
 /// Most frames in a case: more than a second.
 const FRAMES: u32 = 1_500;

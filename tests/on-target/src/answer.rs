@@ -1,7 +1,7 @@
 //! What both sides must agree on after each control period.
 
 use siskin_control::drive::{Bridge, Config, Snapshot, State};
-use siskin_control::units::{AdcCounts, Duty};
+use siskin_units::{AdcCounts, Duty};
 use xxhash_rust::xxh32::xxh32;
 
 /// Words of a period's result: the bridge's, and the digest of the state.

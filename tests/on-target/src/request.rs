@@ -6,7 +6,7 @@ use siskin_control::control::sensing::Shunts;
 use siskin_control::drive::{Excitation, Fault, Pull, Sample, Setpoint};
 use siskin_control::image::Image;
 use siskin_control::params::{BOSSO_BENCH, Board, Greatest, LeastDeadTime, ParamId, Params, TABLE};
-use siskin_control::units::{AdcCounts, Current, Speed};
+use siskin_units::{AdcCounts, Current, Speed};
 
 /// Words of the parameters and the board.
 pub const SET_UP_WORDS: usize = TABLE.len() + BOARD_WORDS;

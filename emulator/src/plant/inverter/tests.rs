@@ -1,4 +1,4 @@
-use siskin_control::units::Duty;
+use siskin_units::Duty;
 
 use super::*;
 use crate::rig::Bench;

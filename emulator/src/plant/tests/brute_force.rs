@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use siskin_control::drive::Bridge;
-use siskin_control::units::Duty;
+use siskin_units::Duty;
 
 use super::super::{Breaks, DIODE_V, Flow, Harmonic, Motor, Plant};
 

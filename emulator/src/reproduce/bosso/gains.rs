@@ -7,9 +7,9 @@ use fixed::types::extra::Unsigned;
 use siskin_control::control::PERIODS;
 use siskin_control::control::delay::Delay;
 use siskin_control::control::{observer, regulator, speed};
-use siskin_control::math::{Gain, Number};
 use siskin_control::params::{BOSSO_BENCH, BOSSO_TABLE_III, Params, build};
-use siskin_control::units::Scale;
+use siskin_units::Scale;
+use siskin_units::math::{Gain, Number};
 
 use super::setting::MOTOR;
 use crate::plant::Sensing;

@@ -2,7 +2,7 @@
 
 use siskin_control::drive::Setpoint;
 use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
-use siskin_control::units::Scale;
+use siskin_units::Scale;
 
 use crate::plant::{Load, Motor};
 use crate::rig::{Bench, Period, Rig};

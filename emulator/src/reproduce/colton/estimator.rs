@@ -9,10 +9,10 @@ use siskin_control::control::observer;
 use siskin_control::control::observer::edges::{self, Sensors};
 use siskin_control::control::observer::flux_linkage::{self, HighPass};
 use siskin_control::control::observer::{crossing, position};
-use siskin_control::math::Gain;
 use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_control::parts;
-use siskin_control::units::{Angle, Current, FLUX_NOMINAL, Speed, Voltage};
+use siskin_units::math::Gain;
+use siskin_units::{Angle, Current, FLUX_NOMINAL, Speed, Voltage};
 
 use crate::rig::Bench;
 

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use siskin_control::control::observer::flux_linkage;
 use siskin_control::control::observer::limits;
-use siskin_control::units::{Angle, Current, FLUX_NOMINAL, Speed};
+use siskin_units::{Angle, Current, FLUX_NOMINAL, Speed};
 
 use super::estimator::{SAMPLE_HZ, fluxes, integrator, rad_s, voltages};
 use super::sheet::{between, figure, over, ratios, spread};

@@ -2,7 +2,7 @@
 //! against its formula.
 
 use siskin_control::control::observer::{crossing, edges, flux_linkage, limits};
-use siskin_control::units::{Angle, FLUX_NOMINAL, Flux, Speed};
+use siskin_units::{Angle, FLUX_NOMINAL, Flux, Speed};
 
 use super::acceleration::{A_E, RPM_S, Runs, Seen, envelope, greatest};
 use super::estimator::{N, SAMPLE_HZ, begun, config, fluxes, follow, hz, integrator, rad_s};

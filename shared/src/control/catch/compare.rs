@@ -1,11 +1,11 @@
 //! Compares a look with its prediction.
 
 use fixed::types::{I2F30, I4F28, I17F15, I19F13};
+use siskin_units::math::{SinCos, TopProduct};
+use siskin_units::traced;
+use siskin_units::{AdcCounts, Angle};
 
 use crate::control::transform::{AlphaBeta, phases};
-use crate::math::{SinCos, TopProduct};
-use crate::trace::traced;
-use crate::units::{AdcCounts, Angle};
 
 /// Highest unambiguous reading of the 12-bit ADC; from here on it may be clamped.
 const CLAMP: I17F15 = I17F15::lit("4094");

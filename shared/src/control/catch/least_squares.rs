@@ -1,10 +1,10 @@
 //! The rotor estimate from the looks so far, by recursive least squares, and the quality of its fit.
 
 use fixed::types::{I0F32, I16F16, I17F15, I20F12};
+use siskin_units::math::{Held, TopProduct};
+use siskin_units::{Angle, Speed};
 
 use super::{Config, LOOK_SHIFT, SUM_FRACTION, Stage, State};
-use crate::math::{Held, TopProduct};
-use crate::units::{Angle, Speed};
 
 /// Speed of the fastest forgetting, a sixteenth of a turn per period with 32 fraction bits.
 const FORGET_MAX: i32 = 1 << 28;

@@ -1,10 +1,10 @@
 //! Configuration and state of the observation.
 
 use fixed::types::{I0F32, I17F15, I20F12};
+use siskin_units::traced;
+use siskin_units::{AdcCounts, Angle, Speed};
 
 use super::compare::Difference;
-use crate::trace::traced;
-use crate::units::{AdcCounts, Angle, Speed};
 
 /// Periods from look to look.
 pub const LOOK_PERIODS: u32 = 1 << LOOK_SHIFT;

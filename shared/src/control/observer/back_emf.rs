@@ -5,15 +5,17 @@
 
 use fixed::types::I4F28;
 use fixed::types::extra::U28;
+use siskin_units::dimension::TurnPerPeriod;
+use siskin_units::math::{
+    Gain, Held, Quantity, SinCos, TopProduct, atan2_turns, divide, magnitude,
+};
+use siskin_units::traced;
+use siskin_units::{Angle, Current, CurrentRate, Flux, InverseFlux, Speed, Voltage, stated_emf};
 
 use super::{Estimate, SlowEstimate};
 use crate::control::delay::Delay;
 use crate::control::regulator::Feedback;
 use crate::control::transform::{Dq, rotate_frame};
-use crate::math::{Gain, Held, Quantity, SinCos, TopProduct, atan2_turns, divide, magnitude};
-use crate::trace::traced;
-use crate::units::dimension::TurnPerPeriod;
-use crate::units::{Angle, Current, CurrentRate, Flux, InverseFlux, Speed, Voltage, stated_emf};
 
 /// Half a turn per period, the maximum of a speed.
 const FASTEST: Quantity<TurnPerPeriod, U28> = Quantity::from_bits(i32::MAX >> 4);

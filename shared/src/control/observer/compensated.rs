@@ -10,19 +10,19 @@
 
 use fixed::types::extra::{U27, U29};
 use fixed::types::{I0F32, I5F27};
+use siskin_units::dimension::Weber;
+use siskin_units::math::{
+    EIGHTH_PI, Gain, Held, Multiplier, Quantity, SinCos, TopProduct, TopSum, sin_cos,
+};
+use siskin_units::traced;
+use siskin_units::{
+    Angle, Current, FLUX_NOMINAL, Flux, InverseFlux, Speed, SpeedSquare, Voltage, WideFlux,
+    WideVoltage,
+};
 
 use super::{Estimate, Input, SlowEstimate};
 use crate::control::inductance::Factor;
 use crate::control::transform::{AlphaBeta, Dq};
-use crate::math::{
-    EIGHTH_PI, Gain, Held, Multiplier, Quantity, SinCos, TopProduct, TopSum, sin_cos,
-};
-use crate::trace::traced;
-use crate::units::dimension::Weber;
-use crate::units::{
-    Angle, Current, FLUX_NOMINAL, Flux, InverseFlux, Speed, SpeedSquare, Voltage, WideFlux,
-    WideVoltage,
-};
 
 /// A flux along an axis of the estimated frame; the sine uses one fraction bit.
 type Component = Quantity<Weber, U27>;

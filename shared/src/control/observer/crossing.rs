@@ -2,13 +2,13 @@
 //! and commutation order. Forward rotation only.
 
 use fixed::types::{I0F32, U0F32};
+use siskin_units::math::{Held, TopProduct, divide};
+use siskin_units::traced;
+use siskin_units::{Angle, Flux, Speed};
 
 use super::flux_linkage::{AMPLITUDE_MAX, AMPLITUDE_MIN, measure};
 use super::position::{Periods, turned};
 use super::sector::Sector;
-use crate::math::{Held, TopProduct, divide};
-use crate::trace::traced;
-use crate::units::{Angle, Flux, Speed};
 
 /// Limits that keep noise from passing for a crossing (2.3.2).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -165,7 +165,7 @@ mod tests {
     use std::f64::consts::{FRAC_2_PI, TAU};
     use std::vec::Vec;
 
-    use crate::units::FLUX_NOMINAL;
+    use siskin_units::FLUX_NOMINAL;
 
     fn config() -> Config {
         Config {

@@ -3,13 +3,14 @@
 //!
 //! Forward rotation only: for the other direction the drive swaps phases b and c in all inputs.
 
+use siskin_units::traced;
+use siskin_units::{Angle, Current, Speed, Voltage};
+
 use super::crossing::{self, Crossing};
 use super::flux_linkage;
 use super::hall::{self, Step};
 use super::position::{self, Periods};
 use crate::parts;
-use crate::trace::traced;
-use crate::units::{Angle, Current, Speed, Voltage};
 
 /// The source of the edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

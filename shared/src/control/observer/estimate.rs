@@ -1,10 +1,11 @@
 //! Input and estimate of every observer.
 
+use siskin_units::math::SinCos;
+use siskin_units::traced;
+use siskin_units::{Angle, Current, INVERSE_FLUX_NOMINAL, InverseFlux, Speed, Voltage};
+
 use crate::control::inductance::Factor;
 use crate::control::transform::AlphaBeta;
-use crate::math::SinCos;
-use crate::trace::traced;
-use crate::units::{Angle, Current, INVERSE_FLUX_NOMINAL, InverseFlux, Speed, Voltage};
 
 /// Input to an observer at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,9 +4,9 @@
 use fixed::FixedI32;
 use fixed::types::extra::U32;
 
-use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns};
-use crate::trace::traced;
-use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, Speed, Voltage};
+use siskin_units::math::{Gain, Held, SinCos, TopProduct, atan2_turns};
+use siskin_units::traced;
+use siskin_units::{Angle, Current, FLUX_NOMINAL, Flux, Speed, Voltage};
 
 use super::sector::Sector;
 

@@ -1,9 +1,10 @@
 //! No observer: an encoder, or a simulation that knows the truth, supplies the rotor's position.
 
+use siskin_units::math::{Held, SinCos};
+use siskin_units::traced;
+use siskin_units::{Angle, Speed};
+
 use super::{Estimate, SlowEstimate};
-use crate::math::{Held, SinCos};
-use crate::trace::traced;
-use crate::units::{Angle, Speed};
 
 traced! {
     /// Angle and speed given for the next sample, with the phases in the order a, b, c.

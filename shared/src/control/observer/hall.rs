@@ -1,8 +1,9 @@
 //! Hall sensors (second paper, section 2.3.1, figure 22): the sector from three bits, and whether they can be
 //! trusted.
 
+use siskin_units::traced;
+
 use super::sector::Sector;
-use crate::trace::traced;
 
 /// Check of the sensor codes.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -14,13 +14,14 @@ pub mod limits;
 pub mod position;
 pub mod sector;
 
+use siskin_units::math::{EIGHTH_PI, SinCos, TopProduct};
+use siskin_units::trace::Trace;
+use siskin_units::{Angle, Current, FLUX_NOMINAL, Flux, Speed, Voltage, WideVoltage, wide};
+
 use super::inductance::Factor;
 use super::regulator::Feedback;
 use super::transform::{AlphaBeta, Dq, phases};
-use crate::math::{EIGHTH_PI, SinCos, TopProduct};
 use crate::parts;
-use crate::trace::Trace;
-use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, Speed, Voltage, WideVoltage, wide};
 pub use estimate::{Estimate, Input, SlowEstimate};
 
 /// The selected observer (`CTL_OBSERVER`) and its coefficients.

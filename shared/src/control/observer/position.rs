@@ -6,11 +6,11 @@
 //! the source of appendix A's error.
 
 use fixed::types::U20F12;
+use siskin_units::math::{Gain, divide};
+use siskin_units::traced;
+use siskin_units::{Angle, QUARTER_TURN, Speed};
 
 use super::sector::Sector;
-use crate::math::{Gain, divide};
-use crate::trace::traced;
-use crate::units::{Angle, QUARTER_TURN, Speed};
 
 /// A time in control periods.
 pub type Periods = U20F12;

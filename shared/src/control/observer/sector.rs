@@ -1,8 +1,8 @@
 //! The sixths of an electrical turn that the signs of three fluxes distinguish (second paper, figures 22 and 24),
 //! shared by flux crossings and Hall sensors.
 
-use crate::trace::traced;
-use crate::units::Angle;
+use siskin_units::Angle;
+use siskin_units::traced;
 
 traced! {
     /// One of six sectors of 60°, numbered in the positive direction. The middle of the first is at 0°, where the

@@ -9,11 +9,12 @@ pub mod observer_based;
 mod reference;
 pub mod synchronous;
 
+use siskin_units::traced;
+use siskin_units::{Current, Speed, Voltage, WideVoltage, wide};
+
 use super::inductance::Factor;
 use super::transform::Dq;
 use crate::parts;
-use crate::trace::traced;
-use crate::units::{Current, Speed, Voltage, WideVoltage, wide};
 pub use reference::{Feedback, Reference};
 
 /// One of the regulators and its coefficients (`CTL_REGULATOR`).

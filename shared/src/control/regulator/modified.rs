@@ -6,12 +6,12 @@
 //! decouple.
 
 use fixed::types::extra::U28;
+use siskin_units::math::{Gain, Held, SinCos, TopProduct, atan2_turns, magnitude};
+use siskin_units::traced;
+use siskin_units::{Angle, Current, QUARTER_TURN, Voltage, WideVoltage};
 
 use super::reference::{Feedback, Reference, excess_current};
 use crate::control::transform::Dq;
-use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, magnitude};
-use crate::trace::traced;
-use crate::units::{Angle, Current, QUARTER_TURN, Voltage, WideVoltage};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, Default, PartialEq)]

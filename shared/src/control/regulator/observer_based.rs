@@ -1,10 +1,11 @@
 //! The observer-based current regulator of the first paper (10).
 
+use siskin_units::math::{Gain, Held, TopProduct};
+use siskin_units::traced;
+use siskin_units::{Current, CurrentRate, Voltage, WideVoltage, narrow};
+
 use super::reference::{Feedback, Reference, excess_current};
 use crate::control::transform::Dq;
-use crate::math::{Gain, Held, TopProduct};
-use crate::trace::traced;
-use crate::units::{Current, CurrentRate, Voltage, WideVoltage, narrow};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, Default, PartialEq)]

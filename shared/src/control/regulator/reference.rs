@@ -1,11 +1,12 @@
 //! Input common to all current regulators, reference and feedback, and the current behind a voltage that was
 //! cut off.
 
+use siskin_units::math::Gain;
+use siskin_units::traced;
+use siskin_units::{Current, Speed, Voltage, WideVoltage, narrow};
+
 use crate::control::inductance::Factor;
 use crate::control::transform::Dq;
-use crate::math::Gain;
-use crate::trace::traced;
-use crate::units::{Current, Speed, Voltage, WideVoltage, narrow};
 
 traced! {
     /// The reference current.

@@ -4,12 +4,13 @@
 //! With each PI's zero on the winding's pole (k_i/k_p = R/L) the loop is first-order, at the bandwidth set by
 //! k_p = bandwidth·L.
 
+use siskin_units::math::{Gain, Held, Multiplier};
+use siskin_units::traced;
+use siskin_units::{Current, Speed, Voltage, WideVoltage, wide};
+
 use super::reference::{Feedback, Reference};
 use crate::control::inductance::Factor;
 use crate::control::transform::Dq;
-use crate::math::{Gain, Held, Multiplier};
-use crate::trace::traced;
-use crate::units::{Current, Speed, Voltage, WideVoltage, wide};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,7 +1,7 @@
 //! The six sextants: each leg's role, and the rotor's position meanwhile.
 
-use crate::trace::traced;
-use crate::units::Angle;
+use siskin_units::Angle;
+use siskin_units::traced;
 
 traced! {
     /// A sextant, named after the switching leg and the leg held low. The current vector stands at 30°, 90° and so

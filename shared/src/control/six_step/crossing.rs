@@ -16,9 +16,9 @@
 
 use fixed::types::I16F16;
 
-use crate::math::{Held, divide};
-use crate::trace::traced;
-use crate::units::Voltage;
+use siskin_units::Voltage;
+use siskin_units::math::{Held, divide};
+use siskin_units::traced;
 
 /// Thresholds.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -5,11 +5,11 @@
 //! current is only bounded. Gains are relative to the maximum speed and the current bound, not to the motor.
 
 use fixed::types::I1F31;
+use siskin_units::math::{Gain, Held};
+use siskin_units::traced;
+use siskin_units::{Current, Duty, Speed};
 
 use crate::control::speed::Bounds;
-use crate::math::{Gain, Held};
-use crate::trace::traced;
-use crate::units::{Current, Duty, Speed};
 
 /// log2 of the time constant, in periods, with which the current's peak decays: longer than a sextant whose ripple
 /// is too fast to regulate away.

@@ -1,12 +1,12 @@
 //! Tracking from crossing to crossing: the rotor's angle and speed, and when the next commutation is due.
 
 use fixed::types::I16F16;
+use siskin_units::math::{Held, divide};
+use siskin_units::traced;
+use siskin_units::{Angle, Speed};
 
 use super::commutation::{HALF_SEXTANT, SEXTANT};
 use crate::control::delay::Delay;
-use crate::math::{Held, divide};
-use crate::trace::traced;
-use crate::units::{Angle, Speed};
 
 /// Consecutive crossings after which the rotor's motion is known well enough to smooth.
 pub const KNOWN: u8 = 6;

@@ -2,12 +2,13 @@
 //! proportional to the square of the commanded speed, the load of a propeller, and a voltage proportional to
 //! that speed, which bypasses the current regulator.
 
+use siskin_units::math::{Gain, Held, TopProduct};
+use siskin_units::traced;
+use siskin_units::{Current, Speed, SpeedSquare, Voltage};
+
 use super::Input;
 use crate::control::regulator::Reference;
 use crate::control::transform::Dq;
-use crate::math::{Gain, Held, TopProduct};
-use crate::trace::traced;
-use crate::units::{Current, Speed, SpeedSquare, Voltage};
 
 /// Coefficients for one outer-loop period, here T_s.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,8 +1,9 @@
 //! Input to both speed laws.
 
+use siskin_units::traced;
+use siskin_units::{Current, Speed};
+
 use crate::control::observer::SlowEstimate;
-use crate::trace::traced;
-use crate::units::{Current, Speed};
 
 /// Input to one period of speed control, [`PERIODS`](crate::control::PERIODS) control periods.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,11 +4,12 @@ pub mod feed_forward;
 mod input;
 pub mod nested;
 
+use siskin_units::traced;
+use siskin_units::{Current, Speed, stated_torque};
+
 use super::planner;
 use super::regulator::Reference;
 use crate::parts;
-use crate::trace::traced;
-use crate::units::{Current, Speed, stated_torque};
 pub use input::{Bounds, Input};
 
 /// The planner and one of the laws.

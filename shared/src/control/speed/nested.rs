@@ -5,14 +5,14 @@
 //! remaining torque allows, so nothing winds up. Without inertia this is (8) as published.
 
 use fixed::types::I0F32;
+use siskin_units::math::{Gain, Held, TopProduct};
+use siskin_units::traced;
+use siskin_units::{Current, Speed, Torque, Voltage, stated_torque};
 
 use super::input::Input;
 use crate::control::regulator::Reference;
 use crate::control::transform::Dq;
 use crate::control::{PERIODS, planner};
-use crate::math::{Gain, Held, TopProduct};
-use crate::trace::traced;
-use crate::units::{Current, Speed, Torque, Voltage, stated_torque};
 
 /// Above this the error acts in full.
 const ALMOST_HALF: I0F32 = I0F32::from_bits(i32::MAX - (1 << 26));

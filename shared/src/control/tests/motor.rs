@@ -2,12 +2,13 @@
 
 use std::f64::consts::TAU;
 
+use siskin_units::{Current, Voltage, WideVoltage, narrow};
+
 use super::{L, P, PHI, R, TS, Units};
 use crate::control::inductance::Factor;
 use crate::control::modulator::{self, VectorLimit};
 use crate::control::regulator::{Feedback, Reference, State};
 use crate::control::transform::Dq;
-use crate::units::{Current, Voltage, WideVoltage, narrow};
 
 /// Model steps per period.
 const PARTS: u32 = 16;

@@ -2,6 +2,8 @@
 
 use std::vec::Vec;
 
+use siskin_units::{AdcCounts, Current};
+
 use super::motor::{Loop, Motor};
 use super::{P, PHI, R, TS, Units, config_with};
 use crate::control::PERIODS;
@@ -11,7 +13,6 @@ use crate::control::speed::{self, Bounds};
 use crate::control::{torque, voltage};
 use crate::params::ParamId;
 use crate::protection;
-use crate::units::{AdcCounts, Current};
 
 use fixed::types::I1F31;
 

@@ -1,14 +1,14 @@
 //! The speed regulators against their equations.
 
 use proptest::prelude::*;
+use siskin_units::trace::Trace;
+use siskin_units::{Current, Torque};
 
 use super::{K_I_OMEGA, K_P_OMEGA, P, PHI, TABLE_III, TS, Units, config_with, near};
 use crate::control::PERIODS;
 use crate::control::observer::SlowEstimate;
 use crate::control::speed::{Bounds, Input, State};
 use crate::params::ParamId;
-use crate::trace::Trace;
-use crate::units::{Current, Torque};
 
 /// `CTL_SPEED`.
 const FEED_FORWARD: f32 = 1.0;

@@ -1,12 +1,12 @@
 //! Coefficients of the six-step drive.
 
 use fixed::types::I1F31;
+use siskin_units::math::Gain;
+use siskin_units::{AdcCounts, Angle, Current, Speed, Voltage};
 
 use crate::control::delay::Delay;
 use crate::control::planner;
 use crate::control::six_step::{crossing, duty};
-use crate::math::Gain;
-use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
 
 /// Consecutive sextants without a crossing after which the rotor is lost: two turns.
 pub(crate) const LOST_SEXTANTS: u8 = 12;

@@ -2,8 +2,8 @@
 
 use fixed::types::I1F31;
 
-use crate::math::Gain;
-use crate::units::{Current, Speed, Voltage};
+use siskin_units::math::Gain;
+use siskin_units::{Current, Speed, Voltage};
 
 /// Highest pitch, turns per period: with eight samples per cycle the largest is at most 8 % below
 /// the current's peak.

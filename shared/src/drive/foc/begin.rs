@@ -1,5 +1,8 @@
 //! The beginning of a drive after Charge, in pieces: a flying start if the rotor turns.
 
+use siskin_units::math::SinCos;
+use siskin_units::{Angle, Current, Speed, Voltage, stated_emf};
+
 use super::outer_loop::{self, PREPARATION_PIECES};
 use super::state::State;
 use crate::control::catch::Rotor;
@@ -11,8 +14,6 @@ use crate::drive::io::{Rotation, Sample, Setpoint, hall};
 use crate::drive::schedule;
 use crate::drive::shared::Shared;
 use crate::drive::transitions::Why;
-use crate::math::SinCos;
-use crate::units::{Angle, Current, Speed, Voltage, stated_emf};
 
 // The periods after Charge, from 1, that prepare a drive. The first ones are the outer loop's; those of a flying start
 // have nothing to do if the rotor stands.

@@ -1,5 +1,7 @@
 //! Brake: all low sides are on, and the observer keeps running.
 
+use siskin_units::{AdcCounts, Current, Speed};
+
 use super::current_loop::input;
 use super::outer_loop::{self, PREPARATION_PIECES};
 use super::state::State;
@@ -10,7 +12,6 @@ use crate::drive::phase::Phase;
 use crate::drive::schedule::{CYCLE, Slot};
 use crate::drive::seen::Seen;
 use crate::drive::shared::Shared;
-use crate::units::{AdcCounts, Current, Speed};
 
 /// Slots between two pieces of preparation.
 const PREPARATION_SLOTS: u32 = 4;

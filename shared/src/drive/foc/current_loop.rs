@@ -1,5 +1,8 @@
 //! The current loop: from the sampled currents to the phase duties.
 
+use siskin_units::math::{Held, SinCos, TopProduct, sin_cos};
+use siskin_units::{Current, Duty, Speed, Voltage, WideVoltage};
+
 use super::state::{Loops, State};
 use crate::control::delay::Delay;
 use crate::control::modulator::{Phases, Supply};
@@ -10,8 +13,6 @@ use crate::drive::config::Config;
 use crate::drive::io::{Bridge, Sample, hall};
 use crate::drive::phase::Phase;
 use crate::drive::shared::Shared;
-use crate::math::{Held, SinCos, TopProduct, sin_cos};
-use crate::units::{Current, Duty, Speed, Voltage, WideVoltage};
 
 /// The control's frame in a period.
 #[derive(Clone, Copy)]

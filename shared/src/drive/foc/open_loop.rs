@@ -1,5 +1,8 @@
 //! The open-loop start, Park and Ramp, and mode changes caused by the rotor.
 
+use siskin_units::math::SinCos;
+use siskin_units::{Current, QUARTER_TURN};
+
 use super::begin;
 use super::state::State;
 use crate::control::regulator::Reference;
@@ -11,9 +14,7 @@ use crate::drive::phase::Phase;
 use crate::drive::schedule::{CYCLE, DAMP_PERIODS};
 use crate::drive::shared::Shared;
 use crate::drive::transitions::Why;
-use crate::math::SinCos;
 use crate::protection::Fault;
-use crate::units::{Current, QUARTER_TURN};
 
 /// Time after which a rotor that something turns the other way has been braked in vain, over that in which a start is
 /// proven: 1.2 s.

@@ -1,5 +1,8 @@
 //! The pieces of outer-loop work.
 
+use siskin_units::math::{Held, sin_cos};
+use siskin_units::{Current, Speed, stated_emf};
+
 use super::state::State;
 use crate::control::regulator::Reference;
 use crate::control::speed::{self, Bounds};
@@ -10,9 +13,7 @@ use crate::drive::phase::Phase;
 use crate::drive::schedule::{CYCLE, SUPPLY_PERIODS, Work};
 use crate::drive::seen::bus_current;
 use crate::drive::shared::Shared;
-use crate::math::{Held, sin_cos};
 use crate::protection;
-use crate::units::{Current, Speed, stated_emf};
 
 /// Pieces that prepare a drive, one per period.
 pub(in crate::drive) const PREPARATION_PIECES: u32 = 5;

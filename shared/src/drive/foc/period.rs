@@ -1,5 +1,7 @@
 //! A period of field-oriented control.
 
+use siskin_units::{AdcCounts, Current};
+
 use super::current_loop::{current_loop, imposed, observed};
 use super::state::State;
 use crate::control::transform::{AlphaBeta, clarke_in};
@@ -8,7 +10,6 @@ use crate::drive::config::Config;
 use crate::drive::io::{Bridge, Sample};
 use crate::drive::schedule;
 use crate::drive::shared::Shared;
-use crate::units::{AdcCounts, Current};
 
 /// Runs a period of Park, Ramp, Run or Stopping.
 #[inline(always)] // in each period

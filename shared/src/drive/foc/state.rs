@@ -1,5 +1,10 @@
 //! State of field-oriented control.
 
+use siskin_units::math::SinCos;
+use siskin_units::trace::Trace;
+use siskin_units::traced;
+use siskin_units::{Angle, Current, Speed, Voltage};
+
 use crate::control::inductance;
 use crate::control::regulator::{self, Reference};
 use crate::control::speed::Bounds;
@@ -7,9 +12,6 @@ use crate::control::transform::{AlphaBeta, Dq, PhaseOrder};
 use crate::control::{dead_time, observer, speed, start, torque, weakening};
 use crate::drive::config::Config;
 use crate::drive::schedule::Slot;
-use crate::math::SinCos;
-use crate::trace::{Trace, traced};
-use crate::units::{Angle, Current, Speed, Voltage};
 
 /// State of field-oriented control.
 #[derive(Clone, Debug, PartialEq)]

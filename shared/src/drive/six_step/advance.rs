@@ -4,11 +4,12 @@
 //! L/R, reach the rotor in time, and with all of the supply in use weakens the flux. And where a sextant has few samples, the
 //! released phase's current may hide the back-EMF until the crossing is past: sooner released, it has decayed by then.
 
+use siskin_units::Angle;
+use siskin_units::math::Held;
+
 use super::state::State;
 use crate::control::six_step::commutation::HALF_SEXTANT;
 use crate::drive::config::six_step::Config;
-use crate::math::Held;
-use crate::units::Angle;
 
 /// Greatest number of hidden samples that counts: slower rotors have enough others.
 const HIDDEN_MOST: u16 = 5;
@@ -45,9 +46,10 @@ fn angle(six_step: &Config, s: &State) -> Angle {
 
 #[cfg(test)]
 mod tests {
+    use siskin_units::Speed;
+    use siskin_units::math::Gain;
+
     use super::*;
-    use crate::math::Gain;
-    use crate::units::Speed;
     use fixed::types::I1F31;
 
     /// The advance in degrees of a rotor with so many periods per sextant, so many hidden samples and this duty.

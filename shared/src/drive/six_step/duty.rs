@@ -1,6 +1,8 @@
 //! The six-step drive's duty, from the demanded speed, current or share.
 
 use fixed::types::I1F31;
+use siskin_units::math::{Held, TopProduct};
+use siskin_units::{AdcCounts, Current, Duty, Speed};
 
 use super::state::{Piece, State};
 use crate::control::planner;
@@ -11,8 +13,6 @@ use crate::drive::config::six_step::Config;
 use crate::drive::config::{self, Stop};
 use crate::drive::io::{Bridge, Setpoint, in_order};
 use crate::drive::shared::Shared;
-use crate::math::{Held, TopProduct};
-use crate::units::{AdcCounts, Current, Duty, Speed};
 
 /// Largest reading that counts as no current: noise, and residual offset. On the bench 0.3 A are 20 rpm.
 pub(super) const NO_CURRENT: AdcCounts = AdcCounts::lit("16");

@@ -1,5 +1,7 @@
 //! The pieces of the outer loop, each in a period of its own.
 
+use siskin_units::{AdcCounts, Current};
+
 use super::state::{Piece, State};
 use super::{duty, telemetry};
 use crate::drive::config;
@@ -8,7 +10,6 @@ use crate::drive::io::Setpoint;
 use crate::drive::phase::Phase;
 use crate::drive::shared::Shared;
 use crate::drive::transitions::Why;
-use crate::units::{AdcCounts, Current};
 
 /// Runs the piece that is due, if any; returns the mode change that the set-point asks for.
 pub(super) fn run(

@@ -1,5 +1,7 @@
 //! A period of the six-step drive.
 
+use siskin_units::{AdcCounts, Speed};
+
 use super::duty::{self, NO_CURRENT, bridge, hold, take_over};
 use super::given::Position;
 use super::state::State;
@@ -15,7 +17,6 @@ use crate::drive::seen::reading;
 use crate::drive::shared::Shared;
 use crate::drive::transitions::Why;
 use crate::protection::Fault;
-use crate::units::{AdcCounts, Speed};
 
 /// Consecutive periods without current after which the shaft counts as standing.
 const STILL_PERIODS: u16 = 1000;

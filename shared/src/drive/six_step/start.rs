@@ -1,5 +1,7 @@
 //! The start: Ramp's current, and another attempt if the rotor was not tracked.
 
+use siskin_units::Current;
+
 use super::duty::most;
 use super::state::State;
 use crate::drive::config::six_step::Config;
@@ -8,7 +10,6 @@ use crate::drive::phase::Phase;
 use crate::drive::shared::Shared;
 use crate::drive::transitions::Why;
 use crate::protection::Fault;
-use crate::units::Current;
 
 /// Returns the current of Ramp: half more after each failed start, up to the bound.
 pub(super) fn current(

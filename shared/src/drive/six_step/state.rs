@@ -1,14 +1,14 @@
 //! State of the six-step drive.
 
 use fixed::types::I1F31;
+use siskin_units::Angle;
+use siskin_units::traced;
 
 use crate::control::PERIODS;
 use crate::control::planner;
 use crate::control::six_step::commutation::{HALF_SEXTANT, Sector};
 use crate::control::six_step::{crossing, duty, tracking};
 use crate::control::speed::Bounds;
-use crate::trace::traced;
-use crate::units::Angle;
 
 /// The pieces of the outer loop. In [`PERIODS`] each falls due once, in every second period; it waits for the end of what a
 /// crossing, a commutation or a piece before it takes.

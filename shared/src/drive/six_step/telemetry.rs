@@ -1,6 +1,8 @@
 //! Telemetry of the six-step drive.
 
 use fixed::types::I1F31;
+use siskin_units::math::{SinCos, TopProduct};
+use siskin_units::{AdcCounts, Angle, Current, Voltage};
 
 use super::state::State;
 use crate::control::PERIODS;
@@ -8,9 +10,7 @@ use crate::control::transform::{Dq, clarke, park};
 use crate::drive::config::Config;
 use crate::drive::phase::Phase;
 use crate::drive::shared::Shared;
-use crate::math::{SinCos, TopProduct};
 use crate::protection;
-use crate::units::{AdcCounts, Angle, Current, Voltage};
 
 /// 1/√3 with 31 fraction bits.
 const RECIPROCAL_ROOT_3: I1F31 = I1F31::from_bits(1_239_850_263);

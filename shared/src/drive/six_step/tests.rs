@@ -1,12 +1,12 @@
 //! The six-step drive on synthetic samples. Tests with a motor model cover how it turns one.
 
 use fixed::types::I1F31;
+use siskin_units::{AdcCounts, Current, Duty, Speed};
 
 use crate::control::six_step::commutation::Sector;
 use crate::drive::io::in_order;
 use crate::drive::{Bridge, Config, Fault, Phase, Sample, Setpoint, State, step};
 use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
-use crate::units::{AdcCounts, Current, Duty, Speed};
 
 fn drive(changes: &[(ParamId, f32)]) -> (Config, State) {
     let mut params = Params::of(&BOSSO_BENCH);

@@ -42,7 +42,7 @@ impl Coasting {
     }
 
     fn angle_error_deg(&self) -> f64 {
-        let truth = crate::units::Angle::wrapping_from_num(self.turns);
+        let truth = siskin_units::Angle::wrapping_from_num(self.turns);
         let angle = self.bench.state.snapshot().angle;
         angle.wrapping_sub(truth).to_num::<f64>() * 360.0
     }

@@ -1,8 +1,9 @@
 //! Legs pulled by the self-test: what switches, and what ends it.
 
+use siskin_units::Duty;
+
 use super::*;
 use crate::drive::Pull;
-use crate::units::Duty;
 
 /// Returns the bridge over this many periods of a pull, with this current into phase b.
 fn pulled(bench: &mut Bench, pull: Pull, periods: usize, b: i32) -> Vec<Bridge> {

@@ -1,7 +1,8 @@
 //! Faults of a drive that has proven itself, and of one that has not.
 
+use siskin_units::Angle;
+
 use super::*;
-use crate::units::Angle;
 
 /// Beyond the trip of 28 A.
 const OVER_CURRENT: [f64; 3] = [-15.0, -15.0, 30.0];

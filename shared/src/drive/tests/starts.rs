@@ -1,11 +1,12 @@
 //! Starts: sequence, attempts and directions.
 
+use siskin_units::Angle;
+
 use super::*;
 use crate::control::observer::sector::Sector;
 use crate::drive::config::QUICK_ATTEMPTS;
 use crate::drive::foc::begin::PREPARATION_PERIODS;
 use crate::drive::schedule::CYCLE;
-use crate::units::Angle;
 use fixed::types::I1F31;
 
 #[test]

@@ -1,10 +1,11 @@
 //! Tones: when one plays, and what ends it.
 
+use siskin_units::Speed;
+
 use super::*;
 use crate::drive::config::tone::PITCH_MAX;
 use crate::drive::schedule::CYCLE;
 use crate::drive::transitions::Why;
-use crate::units::Speed;
 
 /// Returns a pitch of 1 kHz.
 fn tone(bench: &Bench) -> Setpoint {

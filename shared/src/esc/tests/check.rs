@@ -1,10 +1,11 @@
 //! The self-test and what it bars.
 
+use siskin_units::AdcCounts;
+
 use super::storage::ACCEPTED;
 use super::*;
 use crate::check::{Item, Kind, Own, Probe};
 use crate::drive::Sample;
-use crate::units::AdcCounts;
 use mavlink::dialects::ardupilotmega::MavCmd;
 
 /// Readings of a board at rest.

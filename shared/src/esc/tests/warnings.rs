@@ -1,8 +1,9 @@
 //! Warnings of conditions that a motor keeps running with.
 
+use siskin_units::AdcCounts;
+
 use super::*;
 use crate::drive::Limit;
-use crate::units::AdcCounts;
 
 #[test]
 fn what_a_motor_goes_on_with_is_told_once_until_it_rests() {

@@ -2,10 +2,10 @@
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::COMPONENT_METADATA_DATA;
+use siskin_units::math::quotient;
 
 use super::files::GENERAL_CHECKSUM;
 use super::sink::Sink;
-use crate::math::quotient;
 use crate::parts::Part;
 
 /// COMPONENT_INFORMATION, superseded by COMPONENT_METADATA; older ground stations ask for it.

@@ -5,6 +5,8 @@
 
 use core::f32::consts::TAU;
 
+use siskin_units::{Current, Speed};
+
 use super::si::Si;
 use super::{low_speed, observer, outer, sensing, start};
 use crate::control::speed::Bounds;
@@ -14,7 +16,6 @@ use crate::drive::config::six_step;
 use crate::params::choice::{CtlDrive, CtlObsCure, CtlObserver, CtlRegulator};
 use crate::params::from_motor::tests::RACING;
 use crate::params::{BOSSO_MOTOR, Board, ParamId, Params};
-use crate::units::{Current, Speed};
 
 /// Returns what a block makes of that motor with these changes.
 fn made<T>(changes: &[(ParamId, f32)], block: impl FnOnce(&Si) -> T) -> T {

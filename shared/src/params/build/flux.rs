@@ -3,18 +3,18 @@
 use core::f32::consts::TAU;
 
 use fixed::types::{I0F32, U0F32};
+use siskin_units::math::{Real, settled, square_root};
+use siskin_units::{Angle, Flux, Speed};
 
 use super::si::{SLOW_SHARE, Si};
 use crate::control::observer::edges::{Config, Sensors};
 use crate::control::observer::flux_linkage::HighPass;
 use crate::control::observer::{flux_linkage, position};
 use crate::drive::Drift;
-use crate::math::{Real, settled, square_root};
 use crate::params::choice::{CtlFluxForm, CtlHall, CtlObserver};
 use crate::params::from_motor::LEAST_SHARE;
 use crate::params::{Board, ParamId, Params};
 use crate::parts;
-use crate::units::{Angle, Flux, Speed};
 
 /// τ_int·ω at half of `STA_RUN_RPM`, where Run ends with the defaults: there the first-order integrator leads by 10°
 /// (2.2.2).

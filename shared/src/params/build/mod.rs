@@ -38,10 +38,10 @@ use crate::control::low_speed;
 use crate::control::modulator::{self, Modulation};
 use crate::control::sensing::Shunts;
 use crate::drive::{Config, Direction, Drift, Stop, Thresholds};
-use crate::math::Real;
 use crate::parts;
 use crate::protection;
-use crate::units::{AdcCounts, Current, Scale, Speed, Voltage, stated_emf};
+use siskin_units::math::Real;
+use siskin_units::{AdcCounts, Current, Scale, Speed, Voltage, stated_emf};
 
 /// Fastest rotor that six edges per turn can follow, turns per period: two periods per edge.
 const EDGES_TURNS: f32 = 1.0 / 12.0;

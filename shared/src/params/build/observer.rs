@@ -2,17 +2,18 @@
 
 use core::f32::consts::TAU;
 
+use siskin_units::math::{EIGHTH_PI, Multiplier, Real, settled, square_root};
+use siskin_units::{INVERSE_FLUX_NOMINAL, InverseFlux, Speed};
+
 use super::TORQUE_DROP_SHARE;
 use super::flux;
 use super::si::{LINEARISED_SHARE, Si};
 use crate::control::delay::Delay;
 use crate::control::observer::back_emf::Cure;
 use crate::control::observer::{self, back_emf, compensated, edges};
-use crate::math::{EIGHTH_PI, Multiplier, Real, settled, square_root};
 use crate::params::ParamId;
 use crate::params::choice::{CtlObsCure, CtlObserver};
 use crate::parts;
-use crate::units::{INVERSE_FLUX_NOMINAL, InverseFlux, Speed};
 
 /// Poles of the attitude observer (22) over the current bandwidth: Table III has 425.6 against 2357 1/s.
 const ATTITUDE_SHARE: f32 = 0.1806;

@@ -2,14 +2,15 @@
 
 use core::f32::consts::TAU;
 
+use siskin_units::Speed;
+use siskin_units::math::{Gain, Real, SQRT_3};
+
 use super::si::Si;
 use crate::control::speed::{Config, Law, feed_forward, nested};
 use crate::control::{planner, torque, weakening};
-use crate::math::{Gain, Real, SQRT_3};
 use crate::params::ParamId;
 use crate::params::choice::{CtlObserver, CtlRegulator, CtlSpeed};
 use crate::parts;
-use crate::units::Speed;
 
 /// k_iω/k_pω over k_pω/J: Table III has 5.87 against 49.65 1/s.
 const SPEED_CORNER_SHARE: f32 = 0.1183;

@@ -2,14 +2,15 @@
 
 use core::f32::consts::{SQRT_2, TAU};
 
+use siskin_units::math::{Real, SQRT_3};
+use siskin_units::{AdcCounts, Duty};
+
 use super::si::Si;
 use crate::control::modulator::Modulation;
 use crate::control::sensing::{self, Shunts};
 use crate::control::{catch, dead_time};
 use crate::drive::Charge;
-use crate::math::{Real, SQRT_3};
 use crate::params::{Board, ParamId};
-use crate::units::{AdcCounts, Duty};
 
 /// Time over which the offsets are measured, s, rounded to a power of two of periods. 5 ms leave a tenth of one
 /// reading's noise.
@@ -159,13 +160,14 @@ pub(super) fn charge(p: &Si) -> Charge {
 mod tests {
     use core::f32::consts::TAU;
 
+    use siskin_units::{TurnedVoltage, Voltage};
+
     use super::*;
     use crate::control::modulator::{Phases, Supply};
     use crate::control::overmodulation::duties;
     use crate::control::transform::{AlphaBeta, PhaseOrder};
     use crate::drive::Config;
     use crate::params::{BOSSO_BENCH, Params, build};
-    use crate::units::{TurnedVoltage, Voltage};
     use fixed::types::I8F24;
 
     #[test]

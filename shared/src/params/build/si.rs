@@ -4,14 +4,14 @@ use core::cell::Cell;
 use core::f32::consts::FRAC_PI_2;
 
 use fixed::types::extra::Unsigned;
+use siskin_units::math::{Gain, Multiplier, Number, Real, gain_parts};
+use siskin_units::{Scale, Voltage};
 
-use crate::math::{Gain, Multiplier, Number, Real, gain_parts};
 use crate::params::board::Board;
 use crate::params::choice::{CtlObsCure, CtlObserver};
 use crate::params::from_motor::FromMotor;
 use crate::params::table::{Choice, ParamId};
 use crate::params::values::Params;
-use crate::units::{Scale, Voltage};
 
 /// Why parameters do not make a drive.
 #[derive(Clone, Copy, Debug, PartialEq)]

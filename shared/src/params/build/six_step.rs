@@ -3,6 +3,8 @@
 use core::f32::consts::TAU;
 
 use fixed::types::I1F31;
+use siskin_units::Speed;
+use siskin_units::math::Real;
 
 use super::outer;
 use super::si::{OVERMODULATION_HZ, Si, TEST_SHARE, TOO_FEW_PERIODS};
@@ -10,9 +12,7 @@ use crate::control::delay::Delay;
 use crate::control::sensing::Shunts;
 use crate::control::six_step::duty::WHOLE;
 use crate::drive::config::six_step::Config;
-use crate::math::Real;
 use crate::params::ParamId;
-use crate::units::Speed;
 
 /// Least voltage on the floating terminal that counts as back-EMF, V, and the same in counts: above noise and the
 /// difference between the conducting switches.

@@ -2,13 +2,14 @@
 
 use core::f32::consts::TAU;
 
+use siskin_units::math::{Real, square_root};
+use siskin_units::{Charge, INVERSE_FLUX_NOMINAL, Voltage};
+
 use super::si::Si;
 use crate::control::start;
 use crate::drive::ATTEMPTS;
-use crate::math::{Real, square_root};
 use crate::params::ParamId;
 use crate::params::choice::StaMode;
-use crate::units::{Charge, INVERSE_FLUX_NOMINAL, Voltage};
 
 /// Damping ζ of the rotor's swing about the current vector in Park and Ramp.
 const SWING_DAMPING: f32 = 0.5;

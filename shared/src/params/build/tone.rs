@@ -2,9 +2,10 @@
 
 use core::f32::consts::TAU;
 
+use siskin_units::math::Real;
+
 use super::si::Si;
 use crate::drive::config::tone::Config;
-use crate::math::Real;
 use crate::params::ParamId;
 
 /// Share of `MOT_TONE_A` that the peaks are driven to. The dead time's part of a half cycle depends on where the

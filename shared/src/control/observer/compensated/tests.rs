@@ -3,13 +3,14 @@
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
+use siskin_units::{Scale, Voltage};
+
 use super::*;
 use crate::control::PERIODS;
 use crate::control::delay::Delay;
 use crate::control::observer;
 use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
 use crate::parts;
-use crate::units::{Scale, Voltage};
 
 const NONE: Delay = Delay::None(parts::Bench::HERE);
 const HALF: Delay = Delay::Half(parts::Bench::HERE);

@@ -4,11 +4,12 @@ use proptest::prelude::*;
 use std::f64::consts::TAU;
 use std::vec::Vec;
 
+use siskin_units::Scale;
+
 use super::*;
 use crate::control::observer::{self, sector::Sector};
 use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
 use crate::parts;
-use crate::units::Scale;
 
 const CROSSINGS: Sensors = Sensors::None(parts::FluxCrossings::HERE);
 const HALL: Sensors = Sensors::Hall(parts::Hall::HERE);

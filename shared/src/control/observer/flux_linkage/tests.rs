@@ -3,10 +3,11 @@
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
+use siskin_units::Scale;
+
 use super::*;
 use crate::control::observer;
 use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
-use crate::units::Scale;
 
 const R: f64 = 0.108;
 const L: f64 = 30.6e-6;

@@ -6,9 +6,9 @@
 
 use siskin_control::drive::{Bridge, Config, Fault, Sample, Setpoint, State, step};
 use siskin_control::params::{BOSSO_MOTOR, Params, build};
-use siskin_control::units::{AdcCounts, Duty};
 use siskin_firmware::circuit::b_g431b_esc1::{BOARD, ZERO_COUNTS};
 use siskin_firmware::exchange::word::unpack;
+use siskin_units::{AdcCounts, Duty};
 use siskin_vboard::time::CLOCK_HZ;
 
 /// Age at which a set-point is no longer obeyed, s.

@@ -12,6 +12,7 @@ pub trait Trace {
 
 /// Declares a struct with at most one type parameter, or a fieldless enum, that emits its fields' words in
 /// declaration order.
+#[macro_export]
 macro_rules! traced {
     (
         $(#[$attribute:meta])*
@@ -63,8 +64,6 @@ macro_rules! traced {
         }
     };
 }
-
-pub(crate) use traced;
 
 /// Implements [`Trace`] for unsigned numbers of at most 32 bits.
 macro_rules! one_word {

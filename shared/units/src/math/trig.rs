@@ -5,7 +5,6 @@ use fixed::types::I1F31;
 use fixed::types::extra::{U31, U32};
 
 use super::{Number, Quantity, TopProduct};
-use crate::trace::traced;
 
 /// The dimension of an angle.
 #[derive(Clone, Copy, Debug)]

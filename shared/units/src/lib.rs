@@ -1,14 +1,14 @@
-//! The control's own units.
+//! The numbers that the control computes with: quantities in its own units, in fixed point, and angles.
 //!
-//! Inside the control every quantity is a fraction of a base, so that a product needs only its top
-//! half. Conversion from and to SI happens when the configuration is built and in telemetry, never
-//! in a control period.
+//! Every quantity is a fraction of a base, so that a product needs only its top half ([`math`]).
+//! Conversion from and to SI happens when the configuration is built and in telemetry, never in a
+//! control period.
 //!
-//! Each is a [`Quantity`], which adds only to its own kind; [`dimension`] lists every product of
-//! two. A voltage adds to a voltage:
+//! A [`Quantity`] adds only to its own kind; [`dimension`] lists every product of two. A voltage
+//! adds to a voltage:
 //!
 //! ```
-//! # use siskin_control::units::{Current, Voltage};
+//! # use siskin_units::{Current, Voltage};
 //! let (u, i) = (Voltage::lit("0.5"), Current::lit("0.25"));
 //! assert_eq!(u + u, Voltage::ONE);
 //! ```
@@ -16,7 +16,7 @@
 //! but not to a current:
 //!
 //! ```compile_fail,E0308
-//! # use siskin_control::units::{Current, Voltage};
+//! # use siskin_units::{Current, Voltage};
 //! let (u, i) = (Voltage::lit("0.5"), Current::lit("0.25"));
 //! u + i;
 //! ```
@@ -24,7 +24,7 @@
 //! An angle adds what a speed turns in a period:
 //!
 //! ```
-//! # use siskin_control::units::{Angle, Speed};
+//! # use siskin_units::{Angle, Speed};
 //! let (theta, omega) = (Angle::lit("0.25"), Speed::lit("0.01"));
 //! assert!(theta.wrapping_add(omega.over_period()) > theta);
 //! ```
@@ -32,12 +32,23 @@
 //! but not the speed:
 //!
 //! ```compile_fail,E0308
-//! # use siskin_control::units::{Angle, Speed};
+//! # use siskin_units::{Angle, Speed};
 //! let (theta, omega) = (Angle::lit("0.25"), Speed::lit("0.01"));
 //! theta.wrapping_add(omega);
 //! ```
+//!
+//! [`trace`] emits a state word by word, for two machines to compare.
+#![no_std]
+#![forbid(unsafe_code)]
+
+#[cfg(test)]
+extern crate std;
+
+#[macro_use]
+pub mod trace;
 
 pub mod dimension;
+pub mod math;
 
 use fixed::types::I16F16;
 use fixed::types::extra::{U16, U24, U26, U28, U32};

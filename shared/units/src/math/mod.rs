@@ -18,7 +18,7 @@ mod trig;
 
 pub use elementary::{SQRT_3, logarithm, settled, square_root};
 pub use gain::Gain;
-pub(crate) use gain::parts as gain_parts;
+pub use gain::parts as gain_parts;
 pub use held::Held;
 pub use multiplier::Multiplier;
 pub use number::Number;

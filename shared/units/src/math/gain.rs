@@ -83,7 +83,7 @@ const MANTISSA_BITS: i32 = 24;
 ///
 /// Shared by all types and never inlined: the chip calls it for every coefficient.
 #[inline(never)]
-pub(crate) fn parts(k: f32, exponent: i32) -> Option<(i32, u32)> {
+pub fn parts(k: f32, exponent: i32) -> Option<(i32, u32)> {
     if !k.is_finite() {
         return None;
     }
