@@ -2,6 +2,7 @@
 //! snapshots go in; set-points, frames and requests come out.
 
 use heapless::Vec;
+use siskin_throttle::authority::{Command, DriveStatus};
 use siskin_units::Scale;
 use siskin_units::math::Real;
 
@@ -11,7 +12,6 @@ use crate::check::Check;
 use crate::drive::Tracker;
 use crate::drive::{Config, CurrentMonitor, Drift, Phase, Setpoint, Snapshot};
 use crate::identify::Identify;
-use crate::input::authority::{Command, DriveStatus};
 #[cfg(feature = "group")]
 use crate::mavlink::Four;
 use crate::mavlink::{Component, Context, Frame, NO_REBOOT_ARMED, Request, Warning};

@@ -1,4 +1,3 @@
-//! [`input`]: crate::input
 //! [`control`]: crate::control
 //! [`protection`]: crate::protection
 //! [`drive`]: crate::drive
@@ -18,7 +17,7 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Module order
-//! Dependencies run one way: `parts` ← {`tune`, `checksum`, `image`} ← {`input`, `control`} ← `protection` ← `drive`
+//! Dependencies run one way: `parts` ← {`tune`, `checksum`, `image`} ← `control` ← `protection` ← `drive`
 //! ← {`params`, `statistics`} ← {`check`, `identify`, `record`, `setpoint`, `telemetry`} ← {`answer`, `mavlink`}
 //! ← {`throttle`, `store`} ← `esc`. Modules in the same braces do not use each other. A test enforces this order,
 //! and that every folder has a place in it.
@@ -47,7 +46,6 @@ pub mod drive;
 pub mod esc;
 pub mod identify;
 pub mod image;
-pub mod input;
 pub mod mavlink;
 pub mod params;
 pub mod parts;

@@ -1,12 +1,12 @@
 //! Maps what is granted to the drive's set-point.
 
+use siskin_throttle::authority::{Command, Demanded, Granted};
+use siskin_throttle::{Share, reverse};
 use siskin_units::math::{Held, Real, TopProduct};
 use siskin_units::{Current, Scale, Speed};
 
 use crate::drive::Setpoint;
 use crate::drive::config::tone;
-use crate::input::authority::{Command, Demanded, Granted};
-use crate::input::{Share, reverse};
 use crate::params::choice::CtlMode;
 use crate::params::{self, FromMotor, ParamId, Params};
 use crate::tune::Note;

@@ -1,11 +1,11 @@
 //! The ESC's state in SI units.
 
+use siskin_throttle::authority::{Command, DriveStatus};
+use siskin_throttle::signal::Signal;
 use siskin_units::Scale;
 use siskin_units::math::{SQRT_3, square_root};
 
 use crate::drive::{Faults, Limits, Phase, Snapshot};
-use crate::input::authority::{Command, DriveStatus};
-use crate::input::signal::Signal;
 use crate::statistics::Statistics;
 
 /// The ESC's state as telemetry reports it.

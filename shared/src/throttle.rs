@@ -7,17 +7,18 @@
 use core::mem::discriminant;
 
 use heapless::Vec;
+use siskin_throttle::access::Access;
+use siskin_throttle::answer::{Ask, Reply};
+use siskin_throttle::authority::{Authority, Command, Denied, DriveStatus, TestError};
+use siskin_throttle::command::Order;
+use siskin_throttle::line::Event;
+use siskin_throttle::signal::Signal;
+use siskin_throttle::{Heard, Input, News};
 use siskin_units::Scale;
 
 use crate::answer::info;
-use crate::answer::{self, Answer, Answers, Ask, Basis, Reply, Serial};
+use crate::answer::{self, Answer, Answers, Basis, Serial};
 use crate::drive::{Fault, Setpoint, Snapshot};
-use crate::input::access::Access;
-use crate::input::authority::{Authority, Command, Denied, DriveStatus, TestError};
-use crate::input::command::Order;
-use crate::input::line::Event;
-use crate::input::signal::Signal;
-use crate::input::{Heard, Input, News};
 use crate::params::{self, Board, Params, scale};
 use crate::setpoint::{Mapping, Use};
 use crate::telemetry::Telemetry;

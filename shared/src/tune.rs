@@ -3,6 +3,8 @@
 //! A tune tells the user what the ESC has found, so no two sound alike. The drive plays a note
 //! without turning the motor; see [`Setpoint::Tone`](crate::drive::Setpoint::Tone).
 
+use siskin_throttle::command::Beacon;
+
 /// The tunes of the motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tune {
@@ -20,21 +22,6 @@ pub enum Tune {
     Calibrated,
     /// A flight controller searches for its aircraft: one note.
     Beacon(Beacon),
-}
-
-/// The five beacons, DShot commands 1 to 5: each higher than the one before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Beacon {
-    /// Command 1.
-    One,
-    /// Command 2.
-    Two,
-    /// Command 3.
-    Three,
-    /// Command 4.
-    Four,
-    /// Command 5.
-    Five,
 }
 
 /// One sound of a tune.

@@ -21,7 +21,7 @@ LEADS_TO = [
         WAKER,
     ),
     # MAVLink asks the throttle side and checks a changed parameter through what it is given.
-    (r"^siskin_control::mavlink::(component|context|command)::", r" as siskin_control::input::access::Access>::"),
+    (r"^siskin_control::mavlink::(component|context|command)::", r" as siskin_throttle::access::Access>::"),
     (r"^siskin_control::mavlink::parameter::change$", r"^siskin_control::esc::Esc::with_component::{closure}$"),
     # What it hands bytes to is known at link time: the serial line's pipe, which wakes its task.
     (r"^siskin_control::mavlink::sender::Sender::send_payload$", WAKER),

@@ -15,7 +15,7 @@ import pytest
 
 from paths import ROOT
 
-CRATES = ["shared/units", "shared", "firmware", "emulator", "emulator/scope"]
+CRATES = ["shared/units", "shared/throttle", "shared", "firmware", "emulator", "emulator/scope"]
 OWN = "(itself)"
 
 COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)

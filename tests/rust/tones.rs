@@ -1,14 +1,15 @@
 //! Tunes on the benches: audible, with bounded current, on a motor that does not turn.
 
 use siskin_control::drive::{Phase, Setpoint};
-use siskin_control::input::authority::{Authority, Timing};
 use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_control::setpoint::{Mapping, Use};
-use siskin_control::tune::{Beacon, Note, Player, Tune};
+use siskin_control::tune::{Note, Player, Tune};
 use siskin_emulator::device::{Device, Start};
 use siskin_emulator::plant::Fidelity;
 use siskin_emulator::rig::{Bench, Period, Rig};
 use siskin_emulator::scenario::{Standing, stand};
+use siskin_throttle::authority::{Authority, Timing};
+use siskin_throttle::command::Beacon;
 
 /// Returns the set-point of a note that nothing bars.
 fn granted(mapping: &Mapping, note: Note) -> Setpoint {

@@ -1,7 +1,8 @@
 //! What the ESC sends back to the requester: its reply on the throttle wire, and datagrams.
 
-use siskin_control::answer::{Answer, Ask};
-use siskin_control::input::signal::Signal;
+use siskin_control::answer::Answer;
+use siskin_throttle::answer::Ask;
+use siskin_throttle::signal::Signal;
 
 use super::capture::time_ns;
 use super::{Device, Onlooker};

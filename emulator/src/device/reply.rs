@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use siskin_control::answer::{Reply, gcr};
+use siskin_throttle::answer::{Reply, gcr};
 
 use crate::machine::Onlooker;
 

@@ -1,11 +1,11 @@
 //! How a scenario sends throttle.
 
 use serde::Deserialize;
-use siskin_control::input::dshot::{self, Rate};
-use siskin_control::input::endpoints::ZERO_DIVISOR;
-use siskin_control::input::signal::{Pulse, Signal};
 use siskin_control::params::choice::Inp3d;
 use siskin_control::params::{ParamId, Params};
+use siskin_throttle::dshot::{self, Rate};
+use siskin_throttle::endpoints::ZERO_DIVISOR;
+use siskin_throttle::signal::{Pulse, Signal};
 
 /// Share of a pulse's range that counts as zero throttle.
 const ZERO_SHARE: f64 = 1.0 / ZERO_DIVISOR as f64;

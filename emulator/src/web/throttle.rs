@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use siskin_control::input::signal::Signal;
+use siskin_throttle::signal::Signal;
 
 use crate::scenario::dshot_bits;
 use crate::wire::Wire;

@@ -1,8 +1,8 @@
 //! One throttle-wire datagram as levels over time.
 
-use siskin_control::answer::{REPLY_DELAY_NS, gcr, reply_bit_hz};
-use siskin_control::input::dshot::{Rate, edges};
-use siskin_control::input::signal::Signal;
+use siskin_throttle::answer::{REPLY_DELAY_NS, gcr, reply_bit_hz};
+use siskin_throttle::dshot::{Rate, edges};
+use siskin_throttle::signal::Signal;
 
 use super::rejected::Rejected;
 

@@ -2,10 +2,11 @@
 
 mod errors;
 
+use siskin_throttle::line::{Event, Line};
+use siskin_throttle::signal::{Pulse, Signal};
+
 use super::*;
 use proptest::prelude::*;
-use siskin_control::input::line::{Event, Line};
-use siskin_control::input::signal::{Pulse, Signal};
 
 fn edges(wire: &mut Wire) -> Vec<(u64, bool)> {
     std::iter::from_fn(|| wire.next_edge(u64::MAX / 2)).collect()

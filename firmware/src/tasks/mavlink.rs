@@ -9,7 +9,6 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, Ticker};
 use siskin_control::esc::{Esc, obey};
-use siskin_control::input;
 use siskin_control::mavlink::{Receiver, Request};
 
 use super::clock::now;
@@ -122,7 +121,7 @@ impl MainTask<'_> {
         self.supervisor.poll(now);
         let snapshot = self.snapshot.read();
         let telemetry = self.esc.telemetry();
-        let unknown = input::is_unknown(telemetry.signal, telemetry.bad_share);
+        let unknown = siskin_throttle::is_unknown(telemetry.signal, telemetry.bad_share);
         self.light
             .poll(now, snapshot.as_ref(), self.esc.light(), unknown);
         let Some(snapshot) = snapshot else {

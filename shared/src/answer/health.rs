@@ -12,8 +12,9 @@
 //!
 //! The next status word reports an event once, and the ones after it repeat it while it lasts.
 
+use siskin_throttle::answer::extended::{Extended, Status};
+
 use super::Basis;
-use super::extended::{Extended, Status};
 use crate::drive::{Limits, Snapshot};
 
 /// The doubt that warrants a warning: a quarter of what is allowed, as one failed start of four. A crossing

@@ -1,51 +1,24 @@
 //! Answers the flight controller on the throttle wire and on a serial line.
 //!
-//! A bidirectional frame is answered on its own wire ([`gcr`]) with the speed ([`erpm`]) or a word of extended
-//! telemetry ([`extended`]); a frame with its telemetry bit set, on the serial line ([`kiss`]).
+//! A bidirectional frame is answered on its own wire, in the code of [`siskin_throttle::answer`], with the speed or
+//! a word of extended telemetry; a frame with its telemetry bit set, on the serial line ([`kiss`]).
 
 mod basis;
-pub mod erpm;
-pub mod extended;
-pub mod gcr;
 mod health;
 pub mod info;
 pub mod kiss;
 mod schedule;
 
-use core::num::NonZeroU32;
-
+use siskin_throttle::answer::extended::{self, Extended};
+use siskin_throttle::answer::{Ask, FRAME_BITS, REPLY_DELAY_NS, Reply, erpm, gcr, reply_bit_hz};
+use siskin_throttle::dshot::Rate;
 use siskin_units::math::{quotient, round};
 
 use crate::drive::Snapshot;
-use crate::input::command::Order;
-use crate::input::dshot::Rate;
-use crate::input::line::Event;
 use crate::telemetry::Telemetry;
 pub use basis::Basis;
-use extended::Extended;
 use health::Health;
 use schedule::{Kind, Schedule};
-
-/// Time from the end of a frame to its reply, ns, at every rate.
-pub const REPLY_DELAY_NS: u32 = 30_000;
-
-/// Bits of a frame.
-const FRAME_BITS: u32 = 16;
-
-/// The answers a frame requests.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ask {
-    /// Time of the frame's first edge, in ticks of the capture timer.
-    pub first_edge_ticks: u32,
-    /// Bit rate of the frame.
-    pub rate: Rate,
-    /// Duration of the frame, in the same ticks, if its sender's clock is off.
-    pub frame_ticks: Option<NonZeroU32>,
-    /// The frame is to be answered on its wire.
-    pub bidirectional: bool,
-    /// Telemetry is to be sent on the serial line.
-    pub telemetry: bool,
-}
 
 /// The answer to a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,41 +38,6 @@ pub struct Serial {
     pub kiss: Option<[u8; kiss::BYTES]>,
     /// The ESC's information.
     pub info: Option<[u8; info::BYTES]>,
-}
-
-/// A reply on the wire.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Reply {
-    /// 21 bits, first bit highest; 1 is line high.
-    pub bits: u32,
-    /// Bits per second: 5/4 of the frame's, by its sender's clock.
-    pub bit_hz: u32,
-    /// Time of the first bit, in ticks of the capture timer.
-    pub at_ticks: u32,
-}
-
-impl Ask {
-    /// Returns the answers that a frame requests, or `None`.
-    pub fn of(event: &Event) -> Option<Self> {
-        let Event::Frame {
-            rate,
-            bidirectional,
-            frame,
-            first_edge_ticks,
-            frame_ticks,
-        } = *event
-        else {
-            return None;
-        };
-        let info = Order::of(frame.value) == Some(Order::Info);
-        (bidirectional || frame.telemetry || info).then_some(Self {
-            first_edge_ticks,
-            rate,
-            frame_ticks,
-            bidirectional,
-            telemetry: frame.telemetry,
-        })
-    }
 }
 
 /// State carried from answer to answer.
@@ -263,11 +201,6 @@ impl Answers {
 /// Returns the bits of a reply that carries the speed.
 pub fn speed_bits(snapshot: &Snapshot, basis: &Basis) -> u32 {
     gcr::encode(erpm::of_speed(snapshot.speed, &basis.scale))
-}
-
-/// Returns the bit rate of the reply to a frame of this rate, in bits per second.
-pub const fn reply_bit_hz(rate: Rate) -> u32 {
-    rate.bit_hz() / 4 * 5
 }
 
 /// Returns the time from a nominal frame's first edge to its reply, in ticks rounded to nearest.

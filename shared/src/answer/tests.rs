@@ -3,6 +3,7 @@
 use super::*;
 use crate::drive::State;
 use crate::params::{BOSSO_MOTOR, Board, Params, build};
+use core::num::NonZeroU32;
 use std::vec::Vec;
 
 const TICK_HZ: u32 = 170_000_000;

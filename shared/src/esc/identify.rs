@@ -1,9 +1,10 @@
 //! Runs the motor's identification, reports it and keeps the result.
 
+use siskin_throttle::access::Access;
+
 use super::{Esc, check};
 use crate::drive::{Setpoint, Snapshot};
 use crate::identify::{Inputs, Outcome};
-use crate::input::access::Access;
 use crate::params::ParamId;
 use crate::throttle::{LockThrottle, LockedAuthority};
 

@@ -3,15 +3,18 @@
 use std::string::{String, ToString};
 use std::vec::Vec;
 
+use siskin_throttle::access::Access;
+use siskin_throttle::answer::Ask;
+use siskin_throttle::command::Beacon;
+use siskin_throttle::dshot::{self, Rate, edges};
+use siskin_throttle::signal::Signal;
+
 use super::*;
-use crate::answer::{Answer, Ask};
+use crate::answer::Answer;
 use crate::drive::{Direction, Fault, Faults, Setpoint, State};
 use crate::image::Image;
-use crate::input::access::Access;
-use crate::input::dshot::{self, Rate, edges};
-use crate::input::signal::Signal;
 use crate::params::BOSSO_MOTOR;
-use crate::tune::{Beacon, Note, Player};
+use crate::tune::{Note, Player};
 use mavlink::dialects::ardupilotmega::{
     COMMAND_ACK_DATA, MavMessage, MavResult, PARAM_VALUE_DATA, STATUSTEXT_DATA,
 };

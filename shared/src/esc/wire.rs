@@ -1,16 +1,18 @@
 //! What the throttle wire or a command makes the ESC do besides turning the motor: DShot commands, stick
 //! calibration, news.
 
+use siskin_throttle::News;
+use siskin_throttle::calibration::Step;
+use siskin_throttle::command::Beacon;
+use siskin_throttle::command::Order;
+use siskin_throttle::endpoints::EndPoints;
+
 use super::Esc;
 use super::storage::Unstored;
-use crate::input::News;
-use crate::input::calibration::Step;
-use crate::input::command::Order;
-use crate::input::endpoints::EndPoints;
 use crate::mavlink::Act;
 use crate::params::{BuildError, ParamId};
 use crate::throttle::LockThrottle;
-use crate::tune::{Beacon, Tune};
+use crate::tune::Tune;
 
 impl Esc {
     /// Returns true if a command has turned the light on.

@@ -4,6 +4,7 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, COMMAND_INT_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavResult, MavSeverity,
 };
+use siskin_throttle::authority::{self, DriveStatus};
 use siskin_units::math::round;
 
 use super::context::{Act, Context, Request};
@@ -14,7 +15,6 @@ use super::identity::{Identity, Role};
 use super::reply::{Replies, Reply};
 use super::schedule::{Interval, Schedule};
 use super::signing::Trust;
-use crate::input::authority::{self, DriveStatus};
 
 mod calibration;
 mod check;

@@ -8,6 +8,8 @@ use mavlink::dialects::ardupilotmega::{
     PARAM_SET_DATA, SETUP_SIGNING_DATA,
 };
 
+use siskin_throttle::News;
+
 use super::command::{ACCEPTED, Command, Commands, FAILED, IDENTIFY, RUN_PREARM_CHECKS};
 use super::faults::Announcer;
 use super::frame::Address;
@@ -22,7 +24,6 @@ use super::warnings::{Warning, Warnings};
 use super::{ftp, news};
 use crate::drive::Faults;
 use crate::image::Image;
-use crate::input::News;
 use crate::params::{ParamId, Params};
 
 mod send;

@@ -1,10 +1,11 @@
 //! The interface between the component and its caller.
 
+use siskin_throttle::access::Access;
+use siskin_throttle::authority::DriveStatus;
+
 use super::group::Four;
 use crate::check;
 use crate::identify;
-use crate::input::access::Access;
-use crate::input::authority::DriveStatus;
 use crate::params::{Board, BuildError, Params};
 use crate::record::Record;
 use crate::telemetry::Telemetry;

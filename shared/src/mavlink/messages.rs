@@ -3,6 +3,7 @@
 use mavlink::dialects::ardupilotmega::{
     EscConnectionType, MavModeFlag, MavParamType, MavProtocolCapability, MavState,
 };
+use siskin_throttle::signal::{Pulse, Signal};
 use siskin_units::math::{quotient, round};
 
 use super::group::Escs;
@@ -10,7 +11,6 @@ use super::identity::Identity;
 use super::payload::Payload;
 use crate::drive::Faults;
 use crate::image::{Image, PARTS, VERSION};
-use crate::input::signal::{Pulse, Signal};
 use crate::params::{ParamId, Params, TABLE};
 use crate::telemetry::Telemetry;
 

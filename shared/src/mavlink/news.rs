@@ -2,8 +2,8 @@
 
 use mavlink::dialects::ardupilotmega::MavSeverity;
 
-use crate::input::News;
-use crate::input::calibration::Step;
+use siskin_throttle::News;
+use siskin_throttle::calibration::Step;
 
 /// Returns severity and text of news, in two pieces; `None` for news that only a tune announces.
 pub(super) fn words(news: News) -> Option<(MavSeverity, [&'static str; 2])> {

@@ -15,12 +15,13 @@ use mavlink::{
 };
 use std::vec::Vec;
 
+use siskin_throttle::authority::{Authority, Timing};
+
 use super::*;
 use crate::check::Report;
 use crate::drive::{Faults, Limits, Phase};
 use crate::identify;
 use crate::image::Image;
-use crate::input::authority::{Authority, Timing};
 use crate::params::Board;
 use crate::params::{BOSSO_BENCH, BuildError, ParamId, Params};
 use crate::telemetry::{SIGNALS, Telemetry};

@@ -1,10 +1,11 @@
 //! What a board cannot do: such a value is refused, and a stored one brought within the bounds at the start.
 
+use siskin_throttle::signal::Signal;
+
 use super::board::{Board, PwmBound};
 use super::choice::CtlDrive;
 use super::table::ParamId;
 use super::values::Params;
-use crate::input::signal::Signal;
 
 impl Params {
     /// Returns the factory's values on a board.

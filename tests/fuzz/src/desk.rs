@@ -1,15 +1,15 @@
 //! An ESC at rest with a throttle wire, and a judge that knows when its motor may turn.
 
-use siskin_control::answer::Ask;
 use siskin_control::drive::{Setpoint, Snapshot, State};
 use siskin_control::esc::Esc;
-use siskin_control::input::line::{Event, Line};
-use siskin_control::input::signal::Signal;
 use siskin_control::mavlink::Request;
 use siskin_control::params::{BOSSO_MOTOR, ParamId, Params};
 use siskin_control::throttle::Throttle;
 use siskin_emulator::device::Latest;
 use siskin_emulator::rig::Bench;
+use siskin_throttle::answer::Ask;
+use siskin_throttle::line::{Event, Line};
+use siskin_throttle::signal::Signal;
 
 /// Clock of the capture timer.
 pub const CAPTURE_HZ: u32 = 170_000_000;
@@ -258,9 +258,10 @@ impl Judge {
 
 #[cfg(test)]
 mod tests {
+    use siskin_throttle::dshot::{Frame, Rate, edges};
+    use siskin_throttle::signal::Pulse;
+
     use super::*;
-    use siskin_control::input::dshot::{Frame, Rate, edges};
-    use siskin_control::input::signal::Pulse;
 
     /// Returns whether the motor turns after this many zero throttle frames and some at half throttle, 1 ms
     /// apart, and whether it may.

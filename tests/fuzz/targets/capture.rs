@@ -5,8 +5,8 @@ use std::io::Cursor;
 
 use libfuzzer_sys::fuzz_target;
 use siskin::decode::{DecodeError, Options, decode};
-use siskin_control::input::signal::Signal;
 use siskin_fuzz::bytes::Bytes;
+use siskin_throttle::signal::Signal;
 
 fuzz_target!(|input: &[u8]| {
     let mut input = Bytes(input);

@@ -3,9 +3,9 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use siskin_control::input::signal::Signal;
 use siskin_fuzz::bytes::Bytes;
 use siskin_fuzz::desk::Desk;
+use siskin_throttle::signal::Signal;
 
 /// Most steps played, repetitions included: enough to arm by repeating one frame.
 const STEPS_PLAYED: usize = 8_000;

@@ -3,12 +3,13 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use siskin_control::answer::{Ask, REPLY_DELAY_NS, gcr, kiss};
+use siskin_control::answer::kiss;
 use siskin_control::drive::Phase;
-use siskin_control::input::dshot::{Frame, edges};
-use siskin_control::input::signal::{Pulse, Signal};
 use siskin_fuzz::bytes::Bytes;
 use siskin_fuzz::desk::{CAPTURE_HZ, Desk};
+use siskin_throttle::answer::{Ask, REPLY_DELAY_NS, gcr};
+use siskin_throttle::dshot::{Frame, edges};
+use siskin_throttle::signal::{Pulse, Signal};
 use siskin_units::Speed;
 
 /// Most frames in a case: more than a second.

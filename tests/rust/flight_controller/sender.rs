@@ -3,11 +3,11 @@
 
 use mavlink::dialects::ardupilotmega::{MavMessage, STATUSTEXT_DATA};
 use mavlink::{MavlinkVersion, Message, MessageData};
-use siskin_control::answer::gcr;
 use siskin_control::drive::Setpoint;
 use siskin_control::params::{BOSSO_BENCH, ParamId};
 use siskin_emulator::device::{Device, Onlooker, Start};
 use siskin_emulator::rig::{Period, Rig};
+use siskin_throttle::answer::gcr;
 use siskin_units::Speed;
 
 /// Protocol numbers of the wire's datagrams.

@@ -2,9 +2,9 @@
 
 use siskin_control::drive::State;
 use siskin_control::esc::Esc;
-use siskin_control::input::dshot::{Frame, Rate, edges};
 use siskin_control::params::{ParamId, Params};
 use siskin_emulator::rig::Bench;
+use siskin_throttle::dshot::{Frame, Rate, edges};
 
 const TICKS_PER_US: u64 = 170;
 const DSHOT600: f32 = 12.0;

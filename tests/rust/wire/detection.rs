@@ -1,8 +1,8 @@
 //! The detection matrix: every signal is detected under every condition, and nothing else is.
 
-use siskin_control::input::dshot::Frame;
-use siskin_control::input::line::Line;
-use siskin_control::input::signal::{Pulse, Signal};
+use siskin_throttle::dshot::Frame;
+use siskin_throttle::line::Line;
+use siskin_throttle::signal::{Pulse, Signal};
 
 use crate::sender::{Errors, TICK_HZ, Wire, least_period_ns};
 

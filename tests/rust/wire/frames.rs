@@ -1,8 +1,8 @@
 //! A million frames of every signal from a sender with timing errors: each one is decoded correctly.
 
-use siskin_control::input::dshot::{Frame, Rate};
-use siskin_control::input::line::{Event, Line};
-use siskin_control::input::signal::{Pulse, Signal};
+use siskin_throttle::dshot::{Frame, Rate};
+use siskin_throttle::line::{Event, Line};
+use siskin_throttle::signal::{Pulse, Signal};
 
 use crate::sender::{SLOW_TICK_HZ, TICK_HZ, Wire, least_period_ns};
 

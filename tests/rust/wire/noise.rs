@@ -4,12 +4,12 @@
 //! the signal to be detected and with each signal forced; afterwards real frames arm the same wire, which
 //! shows that it could have been armed.
 
-use siskin_control::input::authority::{DriveStatus, Timing};
-use siskin_control::input::demand::Reading;
-use siskin_control::input::dshot::{Frame, Rate};
-use siskin_control::input::line::Event;
-use siskin_control::input::signal::Signal;
-use siskin_control::input::{Heard, Input, Settings};
+use siskin_throttle::authority::{DriveStatus, Timing};
+use siskin_throttle::demand::Reading;
+use siskin_throttle::dshot::{Frame, Rate};
+use siskin_throttle::line::Event;
+use siskin_throttle::signal::Signal;
+use siskin_throttle::{Heard, Input, Settings};
 
 use crate::sender::{Listener, TICK_HZ, Wire, least_period_ns};
 

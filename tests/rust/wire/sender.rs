@@ -1,8 +1,8 @@
 //! A throttle signal sender with the errors of a real one, and the listener on its line.
 
-use siskin_control::input::dshot::{Rate, check_mask, edges};
-use siskin_control::input::line::{Event, Line};
-use siskin_control::input::signal::{Pulse, Signal};
+use siskin_throttle::dshot::{Rate, check_mask, edges};
+use siskin_throttle::line::{Event, Line};
+use siskin_throttle::signal::{Pulse, Signal};
 
 /// The timers of the STM32G431 and the STM32F405.
 pub(crate) const TICK_HZ: u32 = 170_000_000;

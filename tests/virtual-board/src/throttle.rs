@@ -2,10 +2,10 @@
 
 use std::collections::VecDeque;
 
-use siskin_control::answer::{gcr, reply_bit_hz};
-use siskin_control::input::dshot::Rate;
-use siskin_control::input::signal::Signal;
 use siskin_emulator::wire::Wire;
+use siskin_throttle::answer::{gcr, reply_bit_hz};
+use siskin_throttle::dshot::Rate;
+use siskin_throttle::signal::Signal;
 
 use crate::time::{Cycles, NEVER, ns, of_ns};
 
@@ -153,8 +153,9 @@ fn rate_of(bit_ns: u64) -> Option<Rate> {
 
 #[cfg(test)]
 mod tests {
+    use siskin_throttle::dshot::edges;
+
     use super::*;
-    use siskin_control::input::dshot::edges;
 
     /// A frame on a line that rests high.
     fn hear(throttle: &mut Throttle, from_ns: u64, rate: Rate) {

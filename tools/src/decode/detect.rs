@@ -2,8 +2,8 @@
 
 use std::io::BufRead;
 
-use siskin_control::input::line::Event;
-use siskin_control::input::signal::Signal;
+use siskin_throttle::line::Event;
+use siskin_throttle::signal::Signal;
 
 use super::capture::{Capture, Reason};
 use super::sampling::Sampling;

@@ -1,6 +1,6 @@
 //! A DShot frame's edges as they were on the wire: its bits, and how well they are timed.
 
-use siskin_control::input::dshot::Rate;
+use siskin_throttle::dshot::Rate;
 
 use super::Edge;
 

@@ -24,7 +24,7 @@ use std::io::{self, BufRead, BufReader, BufWriter, Read, Seek, Write};
 use std::path::Path;
 
 use clap::Args;
-use siskin_control::input::signal::Signal;
+use siskin_throttle::signal::Signal;
 
 use crate::error::Error;
 use capture::{Capture, Reason};

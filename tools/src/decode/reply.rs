@@ -1,7 +1,7 @@
 //! ESC replies on a bidirectional wire: 21 bits after a frame.
 
-use siskin_control::answer::extended::Extended;
-use siskin_control::answer::{erpm, gcr};
+use siskin_throttle::answer::extended::Extended;
+use siskin_throttle::answer::{erpm, gcr};
 
 use super::Edge;
 

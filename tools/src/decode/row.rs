@@ -1,9 +1,9 @@
 //! A line of the table.
 
 use serde_json::{Value, json};
-use siskin_control::answer::extended::{DISABLED, ENABLED, Extended, Status};
-use siskin_control::input::dshot::{Kind, check_mask, check_sum};
-use siskin_control::input::signal::{Pulse, Signal};
+use siskin_throttle::answer::extended::{DISABLED, ENABLED, Extended, Status};
+use siskin_throttle::dshot::{Kind, check_mask, check_sum};
+use siskin_throttle::signal::{Pulse, Signal};
 
 use super::command;
 use super::measure::Measured;

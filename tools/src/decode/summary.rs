@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 
 use serde_json::{Value, json};
-use siskin_control::input::command::repeats;
-use siskin_control::input::signal::Signal;
+use siskin_throttle::command::repeats;
+use siskin_throttle::signal::Signal;
 
 use super::command;
 use super::measure::{Measured, rate_error_pct};

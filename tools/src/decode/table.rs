@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use siskin_control::input::signal::Signal;
+use siskin_throttle::signal::Signal;
 
 use super::Options;
 use super::row::{HEAD, Row};

@@ -1,8 +1,8 @@
 //! The throttle that a frame or pulse requests.
 
-use siskin_control::input::demand::{Demand, Reading};
-use siskin_control::input::dshot::Kind;
-use siskin_control::input::signal::Signal;
+use siskin_throttle::demand::{Demand, Reading};
+use siskin_throttle::dshot::Kind;
+use siskin_throttle::signal::Signal;
 
 use super::track::What;
 

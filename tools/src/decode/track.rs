@@ -2,9 +2,9 @@
 
 use std::collections::VecDeque;
 
-use siskin_control::input::dshot::{Frame, check_mask};
-use siskin_control::input::line::Event;
-use siskin_control::input::signal::Signal;
+use siskin_throttle::dshot::{Frame, check_mask};
+use siskin_throttle::line::Event;
+use siskin_throttle::signal::Signal;
 
 use super::Edge;
 use super::measure::{EDGES, Measured};

@@ -2,8 +2,8 @@
 
 use std::num::NonZeroU32;
 
-use siskin_control::input::line::{Event, Line};
-use siskin_control::input::signal::Signal;
+use siskin_throttle::line::{Event, Line};
+use siskin_throttle::signal::Signal;
 
 use super::Edge;
 use super::reply::{Heard, Listener, Reply};

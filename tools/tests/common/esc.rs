@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 
 use siskin_control::check::Report;
 use siskin_control::control::delay::Delay;
-use siskin_control::input::authority::{Authority, Timing};
 use siskin_control::mavlink::{Component, Context, Frame, Receiver, Request, Warning, digits};
 use siskin_control::params::{BuildError, ParamId, Params};
 use siskin_control::telemetry::Telemetry;
 use siskin_emulator::plant::Sensing;
+use siskin_throttle::authority::{Authority, Timing};
 
 use crate::run::{Run, siskin};
 

@@ -13,12 +13,13 @@ use core::num::NonZeroU32;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use heapless::Vec;
-use siskin_control::answer::{Ask, Serial};
+use siskin_control::answer::Serial;
 use siskin_control::drive::Snapshot;
-use siskin_control::input::dshot::Rate;
-use siskin_control::input::line::Event;
-use siskin_control::input::signal::Signal;
 use siskin_control::throttle::{LockThrottle, Throttle};
+use siskin_throttle::answer::Ask;
+use siskin_throttle::dshot::Rate;
+use siskin_throttle::line::Event;
+use siskin_throttle::signal::Signal;
 use static_cell::StaticCell;
 
 use super::clock::now;

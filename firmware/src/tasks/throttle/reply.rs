@@ -11,7 +11,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use embassy_stm32::dma::{self, TransferOptions};
 use embassy_stm32::pac::timer::vals::Urs;
-use siskin_control::answer::{Reply, gcr};
+use siskin_throttle::answer::{Reply, gcr};
 
 use super::capture::Capture;
 use crate::board::wire::{

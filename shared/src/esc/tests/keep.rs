@@ -1,10 +1,11 @@
 //! Settings stored unasked, and when.
 
+use siskin_throttle::News;
+use siskin_throttle::calibration::Step;
+use siskin_throttle::endpoints::EndPoints;
+
 use super::storage::{ACCEPTED, REBOOT, REJECTED, STORAGE};
 use super::*;
-use crate::input::News;
-use crate::input::calibration::Step;
-use crate::input::endpoints::EndPoints;
 use crate::mavlink::{KeptSigning, Key};
 use crate::statistics::Statistics;
 use crate::store::{Integrity, Kept, Loaded};

@@ -1,7 +1,8 @@
 //! Storage by throttle wire and MAVLink: it waits for the bridge to rest, one request at a time.
 
+use siskin_throttle::authority::Command;
+
 use super::*;
-use crate::input::authority::Command;
 use crate::mavlink::Receiver;
 use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, MavResult, PARAM_SET_DATA};
 use mavlink::types::CharArray;

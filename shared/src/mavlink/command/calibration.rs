@@ -2,13 +2,13 @@
 //! takes as long as the user does, so it is acknowledged step by step.
 
 use mavlink::dialects::ardupilotmega::MavResult;
+use siskin_throttle::calibration::Step;
+use siskin_throttle::signal::Signal;
 
 use super::{
     ACCEPTED, Act, CANCELLED, Command, Commands, Context, DENIED, DriveStatus, FAILED, IN_PROGRESS,
     PREFLIGHT_CALIBRATION, Replies, TEMPORARILY_REJECTED,
 };
-use crate::input::calibration::Step;
-use crate::input::signal::Signal;
 
 /// Parameter 7: the ESC.
 const ESC: f32 = 1.0;

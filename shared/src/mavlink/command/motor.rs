@@ -1,12 +1,12 @@
 //! Commands that turn the motor briefly, make it sound, or set its direction.
 
 use mavlink::dialects::ardupilotmega::{ActuatorConfiguration, MavResult, MotorTestThrottleType};
+use siskin_throttle::authority::TestError;
 
 use super::{
     ACCEPTED, ACTUATOR_TEST, Act, Command, Commands, Context, DENIED, DriveStatus, Replies,
     Request, TEMPORARILY_REJECTED,
 };
-use crate::input::authority::TestError;
 use crate::params::choice::Inp3d;
 use crate::params::{ParamId, Params};
 

@@ -1,10 +1,10 @@
 use mavlink::dialects::ardupilotmega::{
     COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavProtocolCapability, MavResult,
 };
+use siskin_throttle::authority::Command;
 
 use super::*;
 use crate::drive::Fault;
-use crate::input::authority::Command;
 
 mod calibration;
 mod check;

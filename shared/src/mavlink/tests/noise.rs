@@ -1,11 +1,11 @@
 //! Ten million bytes that are no frames for this ESC: random ones, and damaged frames.
 
 use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, PARAM_REQUEST_LIST_DATA};
+use siskin_throttle::authority::Command;
 
 use super::parameters::{read, set};
 use super::signing::{KEY, SECOND, TODAY, keyed, setup, signed};
 use super::*;
-use crate::input::authority::Command;
 
 /// Bytes on each kind of link.
 const BYTES: usize = 5_000_000;

@@ -5,12 +5,13 @@ use mavlink::dialects::ardupilotmega::{
 
 use std::borrow::ToOwned;
 
+use siskin_throttle::News;
+use siskin_throttle::authority::DriveStatus;
+use siskin_throttle::calibration::Step;
+use siskin_throttle::signal::{Pulse, Signal};
+
 use super::*;
 use crate::drive::Fault;
-use crate::input::News;
-use crate::input::authority::DriveStatus;
-use crate::input::calibration::Step;
-use crate::input::signal::{Pulse, Signal};
 
 pub(super) const HEARTBEAT: u32 = 0;
 pub(super) const ESC_INFO: u32 = 290;

@@ -1,10 +1,11 @@
 //! Settings of the throttle wire, from the parameters.
 
-use crate::input::Settings;
-use crate::input::authority::Timing;
-use crate::input::demand::Reading;
-use crate::input::endpoints::EndPoints;
-use crate::input::signal::Signal;
+use siskin_throttle::Settings;
+use siskin_throttle::authority::Timing;
+use siskin_throttle::demand::Reading;
+use siskin_throttle::endpoints::EndPoints;
+use siskin_throttle::signal::Signal;
+
 use crate::params::choice::Inp3d;
 use crate::params::{ParamId, Params};
 

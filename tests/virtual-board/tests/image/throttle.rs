@@ -1,11 +1,12 @@
 //! The motor follows what the flight controller sends, and its replies tell the speed. Run with `--release`.
 
+use siskin_throttle::answer::{REPLY_DELAY_NS, gcr};
+
 use crate::common::{
     BIDIRECTIONAL_300, BIDIRECTIONAL_600, BIDIRECTIONAL_1200, Board, MS, Throttle, US, image,
 };
 use crate::flight_controller::{Exchange, FlightController};
 use mavlink::dialects::ardupilotmega::{PARAM_REQUEST_LIST_DATA, PARAM_VALUE_DATA};
-use siskin_control::answer::{REPLY_DELAY_NS, gcr};
 use siskin_emulator::machine::Machine as _;
 use siskin_vboard::chip::Cause;
 

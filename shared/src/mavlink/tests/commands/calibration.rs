@@ -1,10 +1,11 @@
 //! PREFLIGHT_CALIBRATION: the throttle end points, by stick.
 
+use siskin_throttle::News;
+use siskin_throttle::calibration::Step;
+use siskin_throttle::endpoints::EndPoints;
+use siskin_throttle::signal::{Pulse, Signal};
+
 use super::*;
-use crate::input::News;
-use crate::input::calibration::Step;
-use crate::input::endpoints::EndPoints;
-use crate::input::signal::{Pulse, Signal};
 
 const CANCELLED: MavResult = MavResult::MAV_RESULT_CANCELLED;
 const IN_PROGRESS: MavResult = MavResult::MAV_RESULT_IN_PROGRESS;

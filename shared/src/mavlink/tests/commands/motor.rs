@@ -1,9 +1,10 @@
 //! Commands that turn the motor briefly, make it sound, or set its direction.
 
+use siskin_throttle::authority::DriveStatus;
+use siskin_throttle::demand::Reading;
+
 use super::*;
 use crate::drive::Fault;
-use crate::input::authority::DriveStatus;
-use crate::input::demand::Reading;
 
 const IN_PROGRESS: MavResult = MavResult::MAV_RESULT_IN_PROGRESS;
 

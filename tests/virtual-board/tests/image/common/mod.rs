@@ -15,7 +15,6 @@ use mavlink::dialects::ardupilotmega::{
     PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA, STATUSTEXT_DATA,
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, MessageData};
-use siskin_control::input::dshot::{Frame as Dshot, check_mask};
 use siskin_control::mavlink::{Address, Receiver};
 use siskin_control::params::ParamId;
 use siskin_emulator::device::Start;
@@ -23,6 +22,7 @@ use siskin_emulator::machine::{Machine, Onlooker};
 use siskin_emulator::plant::Gate;
 use siskin_emulator::rig::{Period, Rig};
 use siskin_emulator::surroundings::{Motion, Passage};
+use siskin_throttle::dshot::{Frame as Dshot, check_mask};
 use siskin_vboard::chip::Cause;
 use siskin_vboard::image::Image;
 use siskin_vboard::machine::VirtualBoard;

@@ -1,7 +1,7 @@
 //! Arming, signal loss and tests, with exact counts and times.
 
 use super::*;
-use crate::input::dshot::{Frame, Rate};
+use crate::dshot::{Frame, Rate};
 use proptest::prelude::*;
 
 mod motor_test;

@@ -1,16 +1,37 @@
-//! Throttle input: turns wire edges into the decision whether the motor may turn.
+//! The throttle wire: turns its edges into the decision whether the motor may turn, and answers on it.
 //!
 //! ```text
 //! timer edges → line::Line → Event → authority::Authority → Command
 //!                                  → command::Commands → Order
 //!                                  → calibration::Calibration → the pulses' end points
+//!                                  → answer::Ask … answer::Reply → wire
 //! ```
 //!
 //! [`dshot`] defines what a frame means and [`endpoints`] what a pulse means; [`line`](mod@line) decodes both
 //! from timer edges; [`authority`] alone decides whether the motor may turn. None of them owns a clock: the
-//! caller passes the time of every event. [`Input`] ties them together.
+//! caller passes the time of every event. [`Input`] ties them together. [`answer`] is the code of the replies.
+//!
+//! ```
+//! use siskin_throttle::dshot::{Frame, Rate, edges};
+//! use siskin_throttle::line::{Event, Line};
+//! use siskin_throttle::signal::Signal;
+//!
+//! let rate = Rate::Dshot300;
+//! let sent = Frame { value: 1046, telemetry: true };
+//! // Captured by a timer of one tick per nanosecond.
+//! let mut line = Line::new(1_000_000_000);
+//! line.force(Some(Signal::Dshot { rate, bidirectional: false }));
+//! let event = edges(sent.to_bits(), rate).find_map(|(at_ns, level)| line.edge(at_ns, level));
+//! assert!(matches!(event, Some(Event::Frame { frame, .. }) if frame == sent));
+//! ```
+#![no_std]
+#![forbid(unsafe_code)]
+
+#[cfg(test)]
+extern crate std;
 
 pub mod access;
+pub mod answer;
 pub mod authority;
 pub mod calibration;
 mod capture;

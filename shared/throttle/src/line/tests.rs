@@ -1,7 +1,7 @@
 //! A complete line: disturbances while a signal is sent, and what is decoded.
 
 use super::*;
-use crate::input::dshot::{check_mask, edges};
+use crate::dshot::{check_mask, edges};
 use proptest::prelude::*;
 use std::vec::Vec;
 

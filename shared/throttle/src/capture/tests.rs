@@ -1,7 +1,7 @@
 //! The decoder on frames at their tolerances, and on edges that are not frames.
 
 use super::*;
-use crate::input::dshot::edges;
+use crate::dshot::edges;
 use proptest::prelude::*;
 use std::vec::Vec;
 

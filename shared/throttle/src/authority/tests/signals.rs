@@ -1,7 +1,7 @@
 //! Pulses, signals before and after identification, and other readings.
 
 use super::*;
-use crate::input::signal::Pulse;
+use crate::signal::Pulse;
 
 fn pulse(width_us: u32) -> Event {
     Event::Pulse {

@@ -33,7 +33,6 @@
 //! random words one in 4096 does. Commands that change something always take six.
 
 use super::dshot::Frame;
-use crate::tune::Beacon;
 
 /// Consecutive frames needed for a command that changes something.
 const REPEATS: u8 = 6;
@@ -50,6 +49,21 @@ const SETTLED_US: u64 = 100_000;
 
 /// The minimum time between two beacons, as flight controllers leave it too, µs.
 const BEACON_APART_US: u64 = 260_000;
+
+/// The five beacons, DShot commands 1 to 5: each higher than the one before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Beacon {
+    /// Command 1.
+    One,
+    /// Command 2.
+    Two,
+    /// Command 3.
+    Three,
+    /// Command 4.
+    Four,
+    /// Command 5.
+    Five,
+}
 
 /// What a command orders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,7 +96,7 @@ pub enum Order {
 
 impl Order {
     /// Returns the order that a value gives, if any.
-    pub(crate) fn of(value: u16) -> Option<Self> {
+    pub fn of(value: u16) -> Option<Self> {
         Some(match value {
             1 => Self::Beacon(Beacon::One),
             2 => Self::Beacon(Beacon::Two),
@@ -107,7 +121,7 @@ impl Order {
     }
 
     /// Returns true if an order given earlier waits until the motor stands.
-    pub(crate) fn waits(self) -> bool {
+    pub fn waits(self) -> bool {
         matches!(
             self,
             Self::Direction { .. } | Self::Spin { .. } | Self::Save

@@ -11,7 +11,7 @@ use super::dshot::{Frame, Rate, edges};
 use super::endpoints::EndPoints;
 use super::signal::Pulse;
 use super::*;
-use crate::tune::Beacon;
+use crate::command::Beacon;
 
 const TICK_HZ: u32 = 170_000_000;
 const DSHOT600: Signal = Signal::Dshot {
