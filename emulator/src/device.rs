@@ -11,14 +11,15 @@ mod run;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use siskin_control::build::BuildError;
 use siskin_control::check::{Item, Own, Probe};
 use siskin_control::drive::Sample;
 use siskin_control::esc::{Esc, check, obey};
 use siskin_control::mavlink::{Frame, Receiver, Request};
-use siskin_control::params::{BOSSO_MOTOR, Board, BuildError, ParamId, Params};
 use siskin_control::record::Record;
 use siskin_control::store::{self, Integrity};
 use siskin_control::throttle::Throttle;
+use siskin_params::{BOSSO_MOTOR, Board, ParamId, Params};
 use siskin_units::AdcCounts;
 use thiserror::Error;
 

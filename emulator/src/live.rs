@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use siskin_control::params::ParamId;
+use siskin_params::ParamId;
 use thiserror::Error;
 
 use crate::device::{Start, StartError};

@@ -12,9 +12,10 @@ use std::mem;
 use std::time::Instant;
 
 use serde::Serialize;
-use siskin_control::control::delay::Delay;
+use siskin_control::build::{BuildError, build};
 use siskin_control::drive::{self, Bridge, Sample, Setpoint};
-use siskin_control::params::{BOSSO_BENCH, BuildError, ParamId, Params, build};
+use siskin_params::Delay;
+use siskin_params::{BOSSO_BENCH, ParamId, Params};
 
 use crate::plant::Fidelity;
 use crate::rig::{Bench, Rig};

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
-use siskin_control::params::{ParamId, Preset};
+use siskin_params::{ParamId, Preset};
 use siskin_scope::printable;
 
 use crate::bench::library;

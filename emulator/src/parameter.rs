@@ -2,7 +2,7 @@
 
 use mavlink::dialects::ardupilotmega::{MavParamType, PARAM_SET_DATA};
 use mavlink::{MAVLinkV2MessageRaw, MavHeader};
-use siskin_control::params::{PRESETS, ParamId, Params, Preset, SetError};
+use siskin_params::{PRESETS, ParamId, Params, Preset, SetError};
 
 /// Finds a parameter by name and checks the value against the table.
 ///

@@ -10,7 +10,7 @@ mod heard;
 mod pack;
 mod state;
 
-use siskin_control::params::ParamId;
+use siskin_params::ParamId;
 
 use crate::device::{Device, Start, StartError};
 use crate::fault::Fault;

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write as _};
 
 use serde::Serialize;
-use siskin_control::params::{ParamId, Params};
+use siskin_params::{ParamId, Params};
 use siskin_scope::printable;
 
 use crate::bench::DEFAULT_MOTOR;

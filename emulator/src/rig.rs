@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use siskin_control::control::delay::Delay;
 use siskin_control::drive::{self, Bridge, Config, Fault, Sample, Setpoint, Snapshot, State};
+use siskin_params::Delay;
 use siskin_units::{Angle, Speed};
 
 pub use crate::bench::{Bench, Position};
@@ -234,7 +234,8 @@ impl Period {
 
 #[cfg(test)]
 mod tests {
-    use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
+    use siskin_control::build::build;
+    use siskin_params::{BOSSO_BENCH, ParamId, Params};
 
     use super::*;
 

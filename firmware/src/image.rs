@@ -75,8 +75,8 @@ const fn field(text: &str) -> [u8; FIELD_BYTES] {
 }
 
 /// Returns the program's identity for MAVLink; the chip's serial number is filled in at run time.
-pub const fn identity(board: &'static str, board_number: u16) -> siskin_control::image::Image {
-    siskin_control::image::Image {
+pub const fn identity(board: &'static str, board_number: u16) -> siskin_params::Image {
+    siskin_params::Image {
         board,
         board_number,
         build: build(env!("SISKIN_COMMIT").as_bytes()),

@@ -2,11 +2,13 @@
 //! snapshots go in; set-points, frames and requests come out.
 
 use heapless::Vec;
+use siskin_params::{Board, ParamId, Params, TRIP_SHARE};
 use siskin_throttle::authority::{Command, DriveStatus};
 use siskin_units::Scale;
 use siskin_units::math::Real;
 
 use crate::answer::info::info;
+use crate::build::{BuildError, build_in, scale};
 use crate::check::Check;
 #[cfg(feature = "drift")]
 use crate::drive::Tracker;
@@ -15,7 +17,6 @@ use crate::identify::Identify;
 #[cfg(feature = "group")]
 use crate::mavlink::Four;
 use crate::mavlink::{Component, Context, Frame, NO_REBOOT_ARMED, Request, Warning};
-use crate::params::{Board, BuildError, ParamId, Params, TRIP_SHARE, build_in, scale};
 use crate::record::Record;
 use crate::setpoint::Use;
 use crate::statistics::Recorder;

@@ -1,6 +1,6 @@
 //! The program's identity, for ground stations (AUTOPILOT_VERSION) and flight controllers (DShot command 6).
 
-use crate::parts::{self, Choice};
+use siskin_params::parts::{self, Choice};
 
 /// Version of every program in this repository: major, minor, patch.
 pub const VERSION: [u8; 3] = version();
@@ -20,29 +20,6 @@ pub const PARTS: &[u8; 8] = match parts::CHOICE {
     Choice::Papers => b"papers\0\0",
     Choice::Custom => b"custom\0\0",
 };
-
-/// A program built for a board, and the chip it runs on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Image {
-    /// Board name as in the build; its first 24 characters are reported.
-    pub board: &'static str,
-    /// Board number, `board_version` of AUTOPILOT_VERSION; 0 is the emulator.
-    pub board_number: u16,
-    /// First eight bytes of the commit hash; zeros if unknown.
-    pub build: [u8; 8],
-    /// Serial number of the microcontroller; zeros if there is none.
-    pub serial: [u8; 12],
-}
-
-impl Image {
-    /// The emulator, and tests on a PC.
-    pub const EMULATOR: Self = Self {
-        board: "emulator",
-        board_number: 0,
-        build: [0; 8],
-        serial: [0; 12],
-    };
-}
 
 /// Initial value of the checksum, over no words.
 pub const NO_WORDS: u32 = 0x811C_9DC5;

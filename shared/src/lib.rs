@@ -1,4 +1,5 @@
 //! [`control`]: crate::control
+//! [`build`]: crate::build
 //! [`protection`]: crate::protection
 //! [`drive`]: crate::drive
 //! [`telemetry`]: crate::telemetry
@@ -8,8 +9,6 @@
 //! [`identify`]: crate::identify
 //! [`record`]: crate::record
 //! [`tune`]: crate::tune
-//! [`parts`]: crate::parts
-//! [`params`]: crate::params
 //! [`store`]: crate::store
 //! [`mavlink`]: crate::mavlink
 //! [`throttle`]: crate::throttle
@@ -17,10 +16,10 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Module order
-//! Dependencies run one way: `parts` ← {`tune`, `checksum`, `image`} ← `control` ← `protection` ← `drive`
-//! ← {`params`, `statistics`} ← {`check`, `identify`, `record`, `setpoint`, `telemetry`} ← {`answer`, `mavlink`}
-//! ← {`throttle`, `store`} ← `esc`. Modules in the same braces do not use each other. A test enforces this order,
-//! and that every folder has a place in it.
+//! Dependencies run one way: {`tune`, `image`} ← `control` ← `protection` ← `drive` ← {`build`, `statistics`}
+//! ← {`check`, `identify`, `record`, `setpoint`, `settings`, `telemetry`} ← {`answer`, `mavlink`} ← {`throttle`, `store`}
+//! ← `esc`. Modules in the same braces do not use each other. A test enforces this order, and that every folder has a
+//! place in it.
 //!
 //! # Inlining
 //! The chip build optimises for size, so the compiler inlines only what is no longer than a call. Every inline
@@ -39,19 +38,18 @@
 extern crate std;
 
 pub mod answer;
+pub mod build;
 pub mod check;
-mod checksum;
 pub mod control;
 pub mod drive;
 pub mod esc;
 pub mod identify;
 pub mod image;
 pub mod mavlink;
-pub mod params;
-pub mod parts;
 pub mod protection;
 pub mod record;
 pub mod setpoint;
+mod settings;
 pub mod statistics;
 pub mod store;
 pub mod telemetry;

@@ -1,14 +1,15 @@
 //! Maps what is granted to the drive's set-point.
 
+use siskin_params::choice::CtlMode;
+use siskin_params::{FromMotor, ParamId, Params};
 use siskin_throttle::authority::{Command, Demanded, Granted};
 use siskin_throttle::{Share, reverse};
 use siskin_units::math::{Held, Real, TopProduct};
 use siskin_units::{Current, Scale, Speed};
 
+use crate::build::test_current;
 use crate::drive::Setpoint;
 use crate::drive::config::tone;
-use crate::params::choice::CtlMode;
-use crate::params::{self, FromMotor, ParamId, Params};
 use crate::tune::Note;
 
 /// What the tasks may use the motor's phases for.
@@ -55,7 +56,7 @@ impl Mapping {
                 CtlMode::Voltage => Mode::Voltage,
             },
             period_s: scale.period_s,
-            test_full: params::test_current(params, scale),
+            test_full: test_current(params, scale),
         }
     }
 
@@ -119,8 +120,10 @@ fn share_of(throttle: Share, full: Current) -> Current {
 
 #[cfg(test)]
 mod tests {
+    use siskin_params::{BOSSO_BENCH, Board};
+
     use super::*;
-    use crate::params::{BOSSO_BENCH, Board, scale};
+    use crate::build::scale;
 
     fn mapping(mode: f32) -> (Mapping, Scale) {
         let mut params = Params::of(&BOSSO_BENCH);

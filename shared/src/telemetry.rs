@@ -168,12 +168,13 @@ impl Default for Telemetry {
 
 #[cfg(test)]
 mod tests {
+    use siskin_params::{BOSSO_BENCH, Board, Params};
     use siskin_units::Voltage;
     use siskin_units::math::Real;
 
     use super::*;
+    use crate::build::build;
     use crate::drive::State;
-    use crate::params::{BOSSO_BENCH, Board, Params, build};
 
     #[test]
     fn a_day_of_short_times_is_not_lost() {

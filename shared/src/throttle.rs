@@ -7,6 +7,7 @@
 use core::mem::discriminant;
 
 use heapless::Vec;
+use siskin_params::{Board, Params};
 use siskin_throttle::access::Access;
 use siskin_throttle::answer::{Ask, Reply};
 use siskin_throttle::authority::{Authority, Command, Denied, DriveStatus, TestError};
@@ -18,9 +19,10 @@ use siskin_units::Scale;
 
 use crate::answer::info;
 use crate::answer::{self, Answer, Answers, Basis, Serial};
+use crate::build::scale;
 use crate::drive::{Fault, Setpoint, Snapshot};
-use crate::params::{self, Board, Params, scale};
 use crate::setpoint::{Mapping, Use};
+use crate::settings;
 use crate::telemetry::Telemetry;
 
 /// How long the tasks' demands on the drive hold, µs: tasks poll every millisecond, and a dead one must not
@@ -91,7 +93,7 @@ impl Throttle {
     #[inline(never)]
     pub fn new(tick_hz: u32, params: &Params, board: &Board) -> Self {
         let scale = scale(params, board);
-        let mut input = Input::new(tick_hz, params::input(params));
+        let mut input = Input::new(tick_hz, settings::of(params));
         // Barred until the tasks report the power-up self-test.
         input.authority_mut().bar(true);
         Self {
@@ -289,7 +291,7 @@ impl Throttle {
     pub(crate) fn adopt(&mut self, params: &Params, scale: Scale) {
         self.mapping = Mapping::new(params, &scale);
         self.basis = Basis::new(scale);
-        self.input.set(params::input(params));
+        self.input.set(settings::of(params));
     }
 
     /// Keeps the motor at rest until [`Throttle::stored`] and returns true, unless something asks it to turn.

@@ -8,14 +8,17 @@ defines.
 
 import functools
 import graphlib
+import json
 import re
+import subprocess
 from collections import defaultdict
+from pathlib import Path
 
 import pytest
 
 from paths import ROOT
 
-CRATES = ["shared/units", "shared/throttle", "shared", "firmware", "emulator", "emulator/scope"]
+CRATES = ["shared/units", "shared/params", "shared/throttle", "shared", "firmware", "emulator", "emulator/scope"]
 OWN = "(itself)"
 
 COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)
@@ -178,3 +181,30 @@ def test_the_crate_s_modules_stand_as_it_says():
         if height[user] <= height[used]
     ]
     assert upward == []
+
+
+def crates_used():
+    """Returns the folder of each crate of the workspace, and the crates that it uses, itself among them, also for its
+    build and its tests."""
+    command = ["cargo", "metadata", "--no-deps", "--offline", "--format-version", "1"]
+    packages = json.loads(subprocess.check_output(command, cwd=ROOT))["packages"]
+    folders = {package["name"]: Path(package["manifest_path"]).parent.relative_to(ROOT) for package in packages}
+    direct = {package["name"]: {need["name"] for need in package["dependencies"]} & folders.keys() for package in packages}
+    used = {}
+    for name in direct:
+        used[name], new = set(), {name}
+        while new:
+            used[name] |= new
+            new = set().union(*(direct[crate] for crate in new)) - used[name]
+    return folders, used
+
+
+def test_the_shared_crates_use_nothing_above_them():
+    folders, used = crates_used()
+    shared = [name for name, folder in folders.items() if folder.is_relative_to("shared")]
+    assert {"siskin-control", "siskin-params", "siskin-throttle", "siskin-units"} <= set(shared)
+    for name in shared:
+        assert used[name] <= set(shared), name
+    # Another throttle wire builds no parameter anew.
+    assert "siskin-throttle" not in used["siskin-params"]
+    assert used["siskin-units"] == {"siskin-units"}

@@ -40,7 +40,7 @@ OTHERS = {
     ("siskin_units", "math", "root", "leg"): (".control_more", 0x800),
     ("siskin_control", "drive", "foc", "period", "start"): (".control_rest", 0x5000),
     ("siskin_control", "control", "speed", "Config", "preset"): (".control_rest", 4),
-    ("siskin_control", "params", "build", "build"): (".text", 4),
+    ("siskin_control", "build", "build"): (".text", 4),
 }
 """Others, with their sizes in bytes."""
 

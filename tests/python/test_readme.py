@@ -248,7 +248,7 @@ def test_the_files_that_contributors_are_led_to_are_there():
 
 
 def test_every_parameter_that_is_named_exists():
-    table = (ROOT / "shared" / "src" / "params" / "table.rs").read_text()
+    table = (ROOT / "shared" / "params" / "src" / "table.rs").read_text()
     known = set(re.findall(r'"([A-Z]{3}_[A-Z0-9_]+)"', table))
     assert len(known) > 50
     groups = "|".join({name[:4] for name in known})

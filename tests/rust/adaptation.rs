@@ -2,9 +2,10 @@
 
 use std::f64::consts::TAU;
 
+use siskin_control::build::build;
 use siskin_control::drive::Setpoint;
-use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_emulator::rig::{Bench, Rig};
+use siskin_params::{BOSSO_BENCH, ParamId, Params};
 
 const RPM: f32 = 4500.0;
 const L_UH: f64 = 30.6;

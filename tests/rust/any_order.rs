@@ -5,13 +5,13 @@ mod station;
 use mavlink::dialects::ardupilotmega::MavCmd;
 use proptest::prelude::*;
 use proptest::sample::select;
-use siskin_control::params::{ParamId, Params};
 use siskin_emulator::bench::library;
 use siskin_emulator::device::Start;
 use siskin_emulator::link::LinkId;
 use siskin_emulator::parameter::set_frame;
 use siskin_emulator::rig::{Bench, Period, Rig};
 use siskin_emulator::scenario::stand;
+use siskin_params::{ParamId, Params};
 use station::{HALF, Station, ZERO};
 use toml::Table;
 

@@ -9,12 +9,12 @@ use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message};
 use siskin_control::drive::{Bridge, Fault, Phase, Setpoint};
 use siskin_control::esc::Esc;
 use siskin_control::mavlink::{Frame, Receiver, Request};
-use siskin_control::params::{BOSSO_BENCH, ParamId, Params};
 use siskin_control::throttle::Throttle;
 use siskin_emulator::device::Latest;
 use siskin_emulator::plant::Fidelity;
 use siskin_emulator::rig::{Bench, Rig};
 use siskin_emulator::wire::Wire;
+use siskin_params::{BOSSO_BENCH, ParamId, Params};
 
 const CAPTURE_HZ: u32 = 170_000_000;
 const MS_NS: u64 = 1_000_000;

@@ -1,9 +1,10 @@
 //! Hall sensors that fail on the bench: in merged mode the flux crossings take over.
 
+use siskin_control::build::build;
 use siskin_control::drive::{Phase, Setpoint};
-use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_emulator::fault::InForce;
 use siskin_emulator::rig::{Bench, Rig};
+use siskin_params::{BOSSO_BENCH, ParamId, Params};
 
 /// Merged with the flux crossings.
 const MERGED: [(ParamId, f32); 2] = [(ParamId::CtlObserver, 2.0), (ParamId::CtlHall, 1.0)];

@@ -10,10 +10,10 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 use siskin_control::drive::Phase;
-use siskin_control::params::ParamId;
 use siskin_emulator::bench::library;
 use siskin_emulator::device::Start;
 use siskin_emulator::scenario::stand;
+use siskin_params::ParamId;
 use siskin_units::Speed;
 use station::{HALF, Station, ZERO};
 

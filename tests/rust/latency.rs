@@ -1,9 +1,9 @@
 //! Latency from the last edge of a throttle frame to the set-point of a control period.
 
 use siskin_control::drive::Setpoint;
-use siskin_control::params::ParamId;
 use siskin_emulator::device::{Device, Onlooker, Start};
 use siskin_emulator::rig::{Period, Rig};
+use siskin_params::ParamId;
 use siskin_throttle::dshot::{Frame, check_mask};
 
 /// Measures from the last edge of a frame before each set-point change to when `step` first gets the new

@@ -10,12 +10,12 @@ use proptest::test_runner::RngSeed;
 use siskin_control::drive::{Setpoint, Snapshot, State};
 use siskin_control::esc::Esc;
 use siskin_control::mavlink::{Receiver, Request};
-use siskin_control::params::{Board, ParamId, Params};
 use siskin_control::store::Kept;
 use siskin_control::throttle::Throttle;
 use siskin_emulator::device::Latest;
 use siskin_emulator::rig::Bench;
 use siskin_emulator::wire::Wire;
+use siskin_params::{Board, ParamId, Params};
 
 const MS_NS: u64 = 1_000_000;
 const CAPTURE_HZ: u32 = 170_000_000;

@@ -2,10 +2,10 @@
 //! motor's torque, to the millisecond of simulated time and with default parameters.
 
 use siskin_control::drive::{Bridge, Setpoint};
-use siskin_control::params::{BOSSO_BENCH, ParamId};
 use siskin_emulator::device::{Device, Start};
 use siskin_emulator::fault::{Fault, Kind, Side};
 use siskin_emulator::rig::{Period, Rig};
+use siskin_params::{BOSSO_BENCH, ParamId};
 
 const MS_NS: u64 = 1_000_000;
 

@@ -4,9 +4,9 @@
 mod station;
 
 use mavlink::dialects::ardupilotmega::{MavCmd, MavResult};
-use siskin_control::params::{ParamId, Params};
 use siskin_emulator::device::Start;
 use siskin_emulator::fault::{Fault, Kind, Side};
+use siskin_params::{ParamId, Params};
 use station::{HALF, Station, ZERO};
 
 const CHECK: MavCmd = MavCmd::MAV_CMD_RUN_PREARM_CHECKS;

@@ -1,9 +1,10 @@
 //! The six-step drive on its bench, with switches, diodes and a floating phase.
 
+use siskin_control::build::build;
 use siskin_control::drive::{Fault, Phase, Setpoint};
-use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_emulator::plant::Fidelity;
 use siskin_emulator::rig::{Bench, Rig};
+use siskin_params::{BOSSO_BENCH, ParamId, Params};
 
 const SIX_STEP: [(ParamId, f32); 2] = [(ParamId::CtlDrive, 1.0), (ParamId::PwmFreqHz, 40_000.0)];
 

@@ -1,13 +1,14 @@
 //! Tunes on the benches: audible, with bounded current, on a motor that does not turn.
 
+use siskin_control::build::build;
 use siskin_control::drive::{Phase, Setpoint};
-use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_control::setpoint::{Mapping, Use};
 use siskin_control::tune::{Note, Player, Tune};
 use siskin_emulator::device::{Device, Start};
 use siskin_emulator::plant::Fidelity;
 use siskin_emulator::rig::{Bench, Period, Rig};
 use siskin_emulator::scenario::{Standing, stand};
+use siskin_params::{BOSSO_BENCH, ParamId, Params};
 use siskin_throttle::authority::{Authority, Timing};
 use siskin_throttle::command::Beacon;
 

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use siskin_control::params::{Kind, ParamId, Params, SetError};
+use siskin_params::{Kind, ParamId, Params, SetError};
 
 use crate::cli::GivenArgs;
 use crate::error::Error;

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use mavlink::dialects::ardupilotmega::{MavCmd, MavResult};
 use serde_json::{Value, json};
-use siskin_control::params::ParamId;
+use siskin_params::ParamId;
 
 use crate::error::Error;
 use crate::message::Message;

@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 use std::io::Write;
 
-use siskin_control::params::{Kind, ParamId};
+use siskin_params::{Kind, ParamId};
 
 use crate::error::Error;
 use crate::params::{NAME_LENGTH, Param};

@@ -13,8 +13,8 @@ use mavlink::{MavlinkVersion, MessageData};
 use serde::Deserialize;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use siskin_control::mavlink::{Address, Receiver};
-use siskin_control::params::ParamId;
 use siskin_control::telemetry::SIGNALS;
+use siskin_params::ParamId;
 use siskin_scope::{ORDERS, Order, Show, Site, ViewerId, What};
 
 use crate::cli::ScopeArgs;

@@ -7,11 +7,12 @@
 
 use std::f64::consts::{FRAC_2_PI, TAU};
 
+use siskin_control::build::{BuildError, build};
 use siskin_control::control::six_step::duty::WHOLE;
 use siskin_control::control::voltage;
 use siskin_control::drive::Config;
-use siskin_control::params::choice::CtlMode;
-use siskin_control::params::{Board, BuildError, ParamId, Params, build};
+use siskin_params::choice::CtlMode;
+use siskin_params::{Board, ParamId, Params};
 use siskin_units::{Current, Voltage};
 
 /// Fundamental of the voltage over the supply: of six-step, by its waveform, and of a vector to the hexagon's corners

@@ -6,7 +6,8 @@ use std::fs;
 use std::io::Write;
 
 use serde_json::{Map, Value, json};
-use siskin_control::params::{BuildError, FromMotor, ParamId, Params};
+use siskin_control::build::BuildError;
+use siskin_params::{FromMotor, ParamId, Params};
 
 use crate::cli::TuneArgs;
 use crate::error::Error;

@@ -7,7 +7,7 @@ use std::fs;
 
 use run::{Run, siskin};
 use serde_json::Value;
-use siskin_control::params::{BOSSO_MOTOR, ParamId};
+use siskin_params::{BOSSO_MOTOR, ParamId};
 
 /// Exit status, stdout and stderr.
 fn budget(arguments: &[&str]) -> (i32, String, String) {

@@ -10,7 +10,7 @@ use std::fs;
 use esc::{Behaviour, Esc, UdpRelay};
 use run::{Run, siskin};
 use serde_json::Value;
-use siskin_control::params::{ParamId, Params, TABLE};
+use siskin_params::{ParamId, Params, TABLE};
 
 /// Asserts the status and returns the output.
 #[track_caller]

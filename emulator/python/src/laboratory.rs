@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use siskin_control::params::ParamId;
 use siskin_emulator::laboratory::{self, Setup};
 use siskin_emulator::parameter::parameter;
 use siskin_emulator::rack::{ESCS_MAX, Environment, Shaft};
 use siskin_emulator::scenario::{self, Standing, ThrottleSignal, stand};
 use siskin_emulator::watch::Void;
+use siskin_params::ParamId;
 
 use crate::Error;
 use crate::convert::to_table;

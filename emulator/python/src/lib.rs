@@ -24,9 +24,9 @@ pyo3::create_exception!(
 #[pyo3::pymodule]
 mod _siskin {
     use pyo3::prelude::*;
-    use siskin_control::params::ParamId;
     use siskin_emulator::bench::library;
     use siskin_emulator::record::Row;
+    use siskin_params::ParamId;
 
     #[pymodule_export]
     use crate::Error;

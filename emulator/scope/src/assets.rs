@@ -1,6 +1,6 @@
 //! The files of the page. Each is in the program.
 
-use siskin_control::mavlink::PARAMETER_METADATA;
+use siskin_params::metadata::PARAMETER_METADATA;
 
 const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";

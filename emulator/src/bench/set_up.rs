@@ -1,8 +1,8 @@
 //! The contents of a bench.
 
-use siskin_control::control::delay::Delay;
 use siskin_control::drive::Config;
-use siskin_control::parts;
+use siskin_params::Delay;
+use siskin_params::parts;
 
 use super::choice::Choice;
 use super::load::LoadTable;

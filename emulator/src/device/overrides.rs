@@ -3,7 +3,7 @@
 use mavlink::dialects::ardupilotmega::PARAM_SET_DATA;
 use mavlink::{MavlinkVersion, MessageData};
 use siskin_control::mavlink::Frame;
-use siskin_control::params::{ParamId, Params};
+use siskin_params::{ParamId, Params};
 
 /// All of them, in order of precedence: the last one wins.
 pub(super) struct Overrides(Vec<Override>);

@@ -11,7 +11,7 @@ mod parameter;
 
 use std::path::PathBuf;
 
-use siskin_control::params::ParamId;
+use siskin_params::ParamId;
 use thiserror::Error;
 
 use crate::device::{Device, Start, StartError};

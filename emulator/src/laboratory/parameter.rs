@@ -1,7 +1,7 @@
 //! A parameter set by a program as a ground station does, by PARAM_SET.
 
 use siskin_control::esc;
-use siskin_control::params::ParamId;
+use siskin_params::ParamId;
 use thiserror::Error;
 
 use super::Laboratory;

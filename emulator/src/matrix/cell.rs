@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 use siskin_control::drive::{Bridge, Limit, Phase, Snapshot};
-use siskin_control::params::{BOSSO_BENCH, ParamId};
+use siskin_params::{BOSSO_BENCH, ParamId};
 
 use super::drive::Drive;
 use super::moment::{Moment, OPENS_S};

@@ -1,10 +1,10 @@
 //! Converts the plant's quantities to ADC counts.
 
-use siskin_control::control::delay::Delay;
-use siskin_control::control::sensing::Shunts;
 use siskin_control::drive::Sample;
-use siskin_control::image::Image;
-use siskin_control::params::{Board, Greatest, LeastDeadTime};
+use siskin_params::Delay;
+use siskin_params::Image;
+use siskin_params::Shunts;
+use siskin_params::{Board, Greatest, LeastDeadTime};
 use siskin_units::AdcCounts;
 
 use super::Noise;
@@ -74,7 +74,7 @@ impl Default for Sensing {
 }
 
 impl Sensing {
-    /// Returns the board that these sensors make, for [`siskin_control::params::build`].
+    /// Returns the board that these sensors make, for [`siskin_control::build::build`].
     pub fn board(&self, delay: Delay) -> Board {
         Board {
             image: Image::EMULATOR,

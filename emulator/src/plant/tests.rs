@@ -8,8 +8,9 @@ use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
 use proptest::prelude::*;
+use siskin_control::build::build;
 use siskin_control::drive::{Bridge, Setpoint};
-use siskin_control::params::{BOSSO_BENCH, Params, build};
+use siskin_params::{BOSSO_BENCH, Params};
 use siskin_units::Duty;
 
 use super::*;

@@ -1,9 +1,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use siskin_control::control::delay::Delay;
+use siskin_control::build::build;
 use siskin_control::drive::{Bridge, Setpoint};
-use siskin_control::params::{BOSSO_BENCH, Params, build};
+use siskin_params::Delay;
+use siskin_params::{BOSSO_BENCH, Params};
 use vcd::{Command, ScopeItem, Value};
 
 use super::{Recorder, Row};

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Deserialize;
-use siskin_control::control::delay::Delay;
-use siskin_control::params::ParamId;
-use siskin_control::parts;
+use siskin_params::Delay;
+use siskin_params::ParamId;
+use siskin_params::parts;
 use toml::{Table, Value};
 
 use super::ScenarioError;

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use siskin_control::drive::Setpoint;
-use siskin_control::params::Params;
+use siskin_params::Params;
 use siskin_units::Scale;
 
 use super::error::ScenarioError;

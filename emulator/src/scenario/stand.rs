@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use siskin_control::params::ParamId;
+use siskin_params::ParamId;
 use toml::{Table, Value};
 
 use super::ScenarioError;
@@ -60,8 +60,9 @@ pub fn stand(base: &str, given: Table) -> Result<Standing, ScenarioError> {
 
 #[cfg(test)]
 mod tests {
+    use siskin_control::build::build;
     use siskin_control::control::speed::Bounds;
-    use siskin_control::params::{BOSSO_BENCH, Params, build};
+    use siskin_params::{BOSSO_BENCH, Params};
     use siskin_units::{Current, Speed};
 
     use super::*;

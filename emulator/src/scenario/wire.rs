@@ -1,8 +1,8 @@
 //! How a scenario sends throttle.
 
 use serde::Deserialize;
-use siskin_control::params::choice::Inp3d;
-use siskin_control::params::{ParamId, Params};
+use siskin_params::choice::Inp3d;
+use siskin_params::{ParamId, Params};
 use siskin_throttle::dshot::{self, Rate};
 use siskin_throttle::endpoints::ZERO_DIVISOR;
 use siskin_throttle::signal::{Pulse, Signal};

@@ -26,7 +26,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use siskin_control::drive::Phase;
-use siskin_control::params::ParamId;
+use siskin_params::ParamId;
 use siskin_scope::{ORDERS, Order, Site, ViewerId, What};
 
 use crate::bench::library;

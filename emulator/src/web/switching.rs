@@ -171,8 +171,9 @@ impl Switching {
 
 #[cfg(test)]
 mod tests {
+    use siskin_control::build::build;
     use siskin_control::drive::Setpoint;
-    use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
+    use siskin_params::{BOSSO_BENCH, ParamId, Params};
 
     use super::*;
     use crate::rig::Bench;

@@ -1,10 +1,10 @@
 //! B-G431B-ESC1: three low-side shunts through on-chip op-amps, 6S, 40 A peak.
 
-use siskin_control::control::delay::Delay;
-use siskin_control::control::sensing::Shunts;
-use siskin_control::params::{Board, Greatest, LeastDeadTime, ParamId, PwmBound};
-use siskin_control::parts;
 use siskin_control::protection::Ntc;
+use siskin_params::Delay;
+use siskin_params::Shunts;
+use siskin_params::parts;
+use siskin_params::{Board, Greatest, LeastDeadTime, ParamId, PwmBound};
 
 use crate::image;
 

@@ -6,10 +6,10 @@
 //! 4.10 have other pins: the shunts of 4.0 to 4.8 are at PA5 and PA6, the thermistor of 4.9 at PA4. The supply
 //! divider of 33 kΩ is theirs alone.
 
-use siskin_control::control::delay::Delay;
-use siskin_control::control::sensing::Shunts;
-use siskin_control::params::{Board, Greatest, LeastDeadTime};
 use siskin_control::protection::Ntc;
+use siskin_params::Delay;
+use siskin_params::Shunts;
+use siskin_params::{Board, Greatest, LeastDeadTime};
 
 use crate::image;
 

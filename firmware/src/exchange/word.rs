@@ -70,9 +70,9 @@ fn rest(number: u32) -> Setpoint {
 #[cfg(test)]
 mod tests {
     use siskin_control::drive::Ripple;
+    use siskin_params::parts::Identification;
 
     use super::*;
-    use siskin_control::parts::Identification;
 
     #[test]
     fn every_setpoint_comes_back_within_the_value_s_step() {

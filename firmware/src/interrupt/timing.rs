@@ -50,11 +50,10 @@ const fn dead_time_code(clocks: u16) -> u8 {
 
 #[cfg(test)]
 mod tests {
-    use siskin_control::control::delay::Delay;
-    use siskin_control::control::sensing::Shunts;
-    use siskin_control::params::{
-        BOSSO_BENCH, Board, Greatest, LeastDeadTime, ParamId, Params, build,
-    };
+    use siskin_control::build::build;
+    use siskin_params::Delay;
+    use siskin_params::Shunts;
+    use siskin_params::{BOSSO_BENCH, Board, Greatest, LeastDeadTime, ParamId, Params};
 
     use super::*;
 

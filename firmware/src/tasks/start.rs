@@ -3,13 +3,13 @@
 use embassy_executor::Spawner;
 use embassy_stm32::uid::uid;
 use siskin_control::esc::{Esc, PowerUp};
-use siskin_control::image::Image;
 use siskin_control::mavlink::Receiver;
-use siskin_control::params::choice::CtlObserver;
-use siskin_control::params::{Board, ParamId, Params};
 use siskin_control::record;
 use siskin_control::store;
 use siskin_control::throttle::{LockThrottle, Throttle};
+use siskin_params::Image;
+use siskin_params::choice::CtlObserver;
+use siskin_params::{Board, ParamId, Params};
 use static_cell::StaticCell;
 
 use super::health::Health;

@@ -2,9 +2,9 @@
 
 use siskin_units::Scale;
 
+use crate::build;
 use crate::drive::config::six_step;
 use crate::drive::{ATTEMPTS, Fault, Snapshot};
-use crate::params;
 
 /// The parts of a [`Config`](crate::drive::Config) needed to interpret a snapshot.
 #[derive(Clone, Copy, Debug)]
@@ -20,7 +20,7 @@ impl Basis {
     pub fn new(scale: Scale) -> Self {
         Self {
             scale,
-            lost_periods: params::lost_periods(&scale),
+            lost_periods: build::lost_periods(&scale),
         }
     }
 

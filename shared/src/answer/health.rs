@@ -69,9 +69,11 @@ impl Health {
 
 #[cfg(test)]
 mod tests {
+    use siskin_params::{BOSSO_MOTOR, Board, Params};
+
     use super::*;
+    use crate::build::build;
     use crate::drive::{Fault, Limit, State};
-    use crate::params::{BOSSO_MOTOR, Board, Params, build};
     use crate::protection::Raised;
 
     fn rig() -> (Basis, Snapshot) {

@@ -16,11 +16,12 @@
 //! | 31 to 62 | name and board, zero-padded |
 //! | 63 | checksum, as in a KISS frame |
 
+use siskin_params::Image;
+use siskin_params::{ParamId, Params};
 use siskin_units::math::round;
 
 use super::kiss::crc8;
-use crate::image::{Image, VERSION};
-use crate::params::{ParamId, Params};
+use crate::image::VERSION;
 
 /// Length in bytes.
 pub const BYTES: usize = 64;

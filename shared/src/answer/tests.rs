@@ -1,8 +1,10 @@
 //! Answers to successive frames, as a flight controller reads them.
 
+use siskin_params::{BOSSO_MOTOR, Board, Params};
+
 use super::*;
+use crate::build::build;
 use crate::drive::State;
-use crate::params::{BOSSO_MOTOR, Board, Params, build};
 use core::num::NonZeroU32;
 use std::vec::Vec;
 

@@ -19,7 +19,7 @@
 
 use core::ops::Range;
 
-use crate::params::{ParamId, Params};
+use siskin_params::{ParamId, Params};
 
 /// A kind of measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -22,11 +22,11 @@ mod items;
 
 pub use items::{Item, Kind, Line, Report};
 
+use siskin_params::{Board, Params};
 use siskin_units::math::{Real, square_root};
 use siskin_units::{AdcCounts, Scale};
 
 use crate::drive::{Phase, Pull, Sample, Snapshot};
-use crate::params::{Board, Params};
 
 /// The measurements a board makes for the self-test.
 pub trait Probe {

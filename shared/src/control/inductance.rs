@@ -5,11 +5,10 @@
 //! + (L − L̂)·i_d along d, so every edge of the wave shows the inductance error: Δφ̂/Δi_d.
 
 use fixed::types::{I0F32, I2F30};
+use siskin_params::parts;
 use siskin_units::math::{Gain, Multiplier, Number, divide};
 use siskin_units::traced;
 use siskin_units::{Current, Flux};
-
-use crate::parts;
 
 traced! {
     /// L over the stated inductance, 0.5 to 1.7.

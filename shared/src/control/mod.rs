@@ -6,7 +6,6 @@
 
 pub mod catch;
 pub mod dead_time;
-pub mod delay;
 pub mod inductance;
 pub mod low_speed;
 pub mod modulator;

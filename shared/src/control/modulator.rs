@@ -4,7 +4,8 @@
 use crate::control::dead_time::Share;
 use fixed::types::extra::U20;
 use fixed::types::{I0F32, I1F31, I8F24};
-
+use siskin_params::Shunts;
+use siskin_params::parts;
 use siskin_units::dimension::Volt;
 use siskin_units::math::{Held, Multiplier, Quantity, Real, SQRT_3, TopProduct, TopSum, other_leg};
 use siskin_units::traced;
@@ -14,9 +15,7 @@ use siskin_units::{
 };
 
 use super::dead_time;
-use super::sensing::Shunts;
 use super::transform::{AlphaBeta, Dq, PhaseOrder, phases_in};
-use crate::parts;
 
 /// The choice of common-mode voltage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -107,12 +107,12 @@ pub fn beyond_hexagon(
 
 #[cfg(test)]
 mod tests {
+    use siskin_params::Shunts::{self, Three, Two};
     use siskin_units::Speed;
 
     use super::*;
     use crate::control::dead_time;
     use crate::control::modulator::{Modulation, Supply};
-    use crate::control::sensing::Shunts::{self, Three, Two};
     use crate::control::transform::PhaseOrder;
     use core::f64::consts::TAU;
 

@@ -7,30 +7,10 @@
 //! and sampling itself is short, so the half before counts: the elapsed period's duties.
 
 use fixed::types::I16F16;
-
+use siskin_params::Shunts;
 use siskin_units::math::Held;
 use siskin_units::traced;
 use siskin_units::{AdcCounts, Duty};
-
-/// Which phases have a shunt.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Shunts {
-    /// All three phases; the one with the highest duty may go unread.
-    #[default]
-    Three,
-    /// Phases a and b: both must be read every period, so no duty may exceed [`Config::window`].
-    Two,
-}
-
-impl Shunts {
-    /// Returns the number of phases with a shunt, counted from a.
-    pub const fn count(self) -> usize {
-        match self {
-            Self::Three => 3,
-            Self::Two => 2,
-        }
-    }
-}
 
 /// Coefficients of the reconstruction.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -6,16 +6,17 @@
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
+use siskin_params::Delay;
+use siskin_params::parts;
+use siskin_params::{BOSSO_BENCH, Board, ParamId, Params};
 use siskin_units::{Angle, Current, InverseFlux, Speed, Torque, Voltage, WideVoltage};
 
-use super::delay::Delay;
 use super::inductance::Factor;
 use super::observer::{self, back_emf};
 use super::regulator::Feedback;
 use super::transform::Dq;
+use crate::build::build;
 use crate::drive::Config;
-use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
-use crate::parts;
 
 mod inductance;
 mod motor;

@@ -1,7 +1,6 @@
 //! Clarke's and Park's transforms, amplitude-invariant (11), (12).
 
 use fixed::types::{I0F32, I1F31};
-
 use siskin_units::math::{Held, Number, SinCos, TopProduct, TopSum};
 use siskin_units::trace::Trace;
 use siskin_units::traced;

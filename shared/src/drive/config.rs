@@ -5,15 +5,15 @@ pub mod tone;
 
 use core::mem::MaybeUninit;
 
+use siskin_params::Delay;
+use siskin_params::parts;
 use siskin_units::math::{Gain, Multiplier};
 use siskin_units::{AdcCounts, Current, Duty, Scale, Speed, Voltage, WideVoltage};
 
-use crate::control::delay::Delay;
 use crate::control::{
     catch, dead_time, inductance, low_speed, modulator, observer, regulator, sensing, speed, start,
     torque, weakening,
 };
-use crate::parts;
 use crate::protection;
 
 /// Direction of rotation.
@@ -55,7 +55,7 @@ pub const ATTEMPTS: usize = 4;
 /// soon after it is let go.
 pub const QUICK_ATTEMPTS: u8 = 32;
 
-/// The drive's configuration, computed by [`crate::params::build`] and swapped in whole.
+/// The drive's configuration, computed by [`crate::build::build`] and swapped in whole.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// The control's units in SI.

@@ -173,9 +173,11 @@ mod tests {
     use std::vec;
     use std::vec::Vec;
 
+    use siskin_params::{BOSSO_BENCH, Board, Params};
+
     use super::*;
+    use crate::build::build;
     use crate::drive::{Phase, State};
-    use crate::params::{BOSSO_BENCH, Board, Params, build};
 
     /// Turns of the rotor from sample to sample: at idle, at 1200 turns a second, near a half, and nearly one.
     const STEPS: [f64; 4] = [0.094, 0.2, 0.49, 0.933];

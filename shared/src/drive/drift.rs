@@ -213,11 +213,12 @@ fn product(a: &[f32; 3], b: &[f32; 3]) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use siskin_params::{BOSSO_BENCH, Board, Params};
     use siskin_units::{Flux, Speed, Voltage};
 
     use super::*;
+    use crate::build::build;
     use crate::drive::State;
-    use crate::params::{BOSSO_BENCH, Board, Params, build};
 
     /// The first paper's motor on the bench: 26.7 A and 49 V are a unit.
     const STATED: Stated = Stated {

@@ -1,9 +1,8 @@
 //! The identification's excitation of a standing motor's windings.
 
+use siskin_params::parts::Identification;
 use siskin_units::Current;
 use siskin_units::traced;
-
-use crate::parts::Identification;
 
 traced! {
     /// Direction of the square wave.

@@ -9,6 +9,7 @@
 //! Throughout, each phase's voltage keeps the sign of its current: the dead time's effect is constant, and the
 //! difference between two currents yields R without it.
 
+use siskin_params::Delay;
 use siskin_units::traced;
 use siskin_units::{AdcCounts, Angle, Current, Duty, Speed, Voltage};
 
@@ -18,7 +19,6 @@ use super::io::Bridge;
 use super::phase::Phase;
 use super::seen::Seen;
 use super::shared::Shared;
-use crate::control::delay::Delay;
 use crate::control::modulator;
 use crate::control::transform::{AlphaBeta, Dq, clarke};
 

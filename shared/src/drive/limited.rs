@@ -89,10 +89,12 @@ fn near(bound: Current) -> Current {
 
 #[cfg(test)]
 mod tests {
+    use siskin_params::{BOSSO_BENCH, Board, Params};
+
     use super::*;
+    use crate::build::build;
     use crate::control::speed::Bounds;
     use crate::drive::{Phase, State};
-    use crate::params::{BOSSO_BENCH, Board, Params, build};
 
     fn at(share_d: f64, share_q: f64) -> (Thresholds, Snapshot) {
         let config = build(&Params::of(&BOSSO_BENCH), &Board::BENCH).expect("the defaults fit");

@@ -21,7 +21,7 @@
 //! | a current or voltage beyond its trip ends the drive | `step.rs`, [`protection`](crate::protection) |
 //! | Clarke, then the observer's angle and speed, then Park | `foc/period.rs`, `foc/current_loop.rs`, [`control::observer`](crate::control::observer) |
 //! | the current regulator's voltage, with decoupling; anti-windup where the supply falls short | `foc/current_loop.rs`, [`control::regulator`](crate::control::regulator) |
-//! | delay compensation, inverse Park, dead time, duties | [`control::delay`](crate::control::delay), [`control::modulator`](crate::control::modulator) |
+//! | delay compensation, inverse Park, dead time, duties | [`Delay`](siskin_params::Delay), [`control::modulator`](crate::control::modulator) |
 //! | the duties reach the timer, effective from the next period | `firmware/src/interrupt/pwm.rs`; emulator: `plant/inverter.rs` |
 //!
 //! The regulator's reference comes from the outer loop: speed regulator, limits, delay compensation and dead-time

@@ -1,5 +1,7 @@
 //! State that every mode uses and none owns: protection, current offsets, faults, applied duties.
 
+use siskin_params::Delay;
+use siskin_params::Shunts;
 use siskin_units::math::Held;
 use siskin_units::traced;
 use siskin_units::{AdcCounts, Duty, Speed, Voltage};
@@ -9,9 +11,8 @@ use super::io::{Rotation, Sample, Setpoint};
 use super::phase::Phase;
 use super::seen::Seen;
 use super::transitions::Why;
-use crate::control::delay::Delay;
 use crate::control::modulator::Supply;
-use crate::control::sensing::{self, Shunts};
+use crate::control::sensing;
 use crate::protection::{self, Fault, Faults};
 
 traced! {

@@ -4,10 +4,11 @@
 use std::f64::consts::TAU;
 use std::vec::Vec;
 
+use siskin_params::{BOSSO_BENCH, Board, ParamId, Params};
 use siskin_units::{AdcCounts, Current, Speed};
 
 use super::*;
-use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
+use crate::build::build;
 
 mod any;
 mod at_rest;

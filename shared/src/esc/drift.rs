@@ -1,10 +1,11 @@
 //! Follows the motor's resistance and flux, and reports them.
 
+use siskin_params::ParamId;
+use siskin_params::choice::{CtlAdaptL, CtlDrive, CtlObserver};
+
 use super::Esc;
 use super::fit::check_drifted;
 use crate::drive::{Snapshot, Stated};
-use crate::params::ParamId;
-use crate::params::choice::{CtlAdaptL, CtlDrive, CtlObserver};
 
 impl Esc {
     /// Takes in what the default observer shows of the motor, and has the configuration rebuilt if that has changed.

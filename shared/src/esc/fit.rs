@@ -2,10 +2,11 @@
 
 use core::mem::MaybeUninit;
 
+use siskin_params::{Board, ParamId, Params};
 use siskin_units::Scale;
 
+use crate::build::{BuildError, build_in, scale};
 use crate::drive::{Config, Drift, put_default};
-use crate::params::{Board, BuildError, ParamId, Params, build_in, scale};
 
 /// Values the drive runs with in place of the parameters.
 #[derive(Clone, Copy, Debug)]

@@ -1,11 +1,11 @@
 //! Runs the motor's identification, reports it and keeps the result.
 
+use siskin_params::ParamId;
 use siskin_throttle::access::Access;
 
 use super::{Esc, check};
 use crate::drive::{Setpoint, Snapshot};
 use crate::identify::{Inputs, Outcome};
-use crate::params::ParamId;
 use crate::throttle::{LockThrottle, LockedAuthority};
 
 /// Steps reported to the user, each with the progress at which it begins, percent.

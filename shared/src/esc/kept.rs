@@ -1,8 +1,9 @@
 //! The values that survive a loss of power.
 
+use siskin_params::ParamId;
+
 use super::Esc;
 use crate::mavlink::Warning;
-use crate::params::ParamId;
 use crate::record::Record;
 use crate::store::{Kept, Loaded};
 

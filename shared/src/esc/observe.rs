@@ -1,10 +1,11 @@
 //! Takes in what the drive and the board show at each poll: temperature, limits, consumption and statistics.
 
+use siskin_params::ParamId;
 use siskin_units::math::magnitude;
 
 use super::Esc;
+use crate::build::{thresholds, unbalance_max};
 use crate::drive::Snapshot;
-use crate::params::{ParamId, thresholds, unbalance_max};
 use crate::statistics::Inputs;
 
 /// How far below `LIM_TEMP_C` an over-temperature clears, °C.

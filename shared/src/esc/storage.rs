@@ -3,9 +3,9 @@
 use core::ops::Range;
 
 use embedded_storage::nor_flash::NorFlash;
+use siskin_params::ParamId;
 
 use crate::mavlink::Request;
-use crate::params::ParamId;
 use crate::store::{self, Kept, StoreError};
 
 /// How long without a change before changes are stored, µs: a client that writes a whole parameter list wears

@@ -3,6 +3,8 @@
 use std::string::{String, ToString};
 use std::vec::Vec;
 
+use siskin_params::BOSSO_MOTOR;
+use siskin_params::Image;
 use siskin_throttle::access::Access;
 use siskin_throttle::answer::Ask;
 use siskin_throttle::command::Beacon;
@@ -12,8 +14,6 @@ use siskin_throttle::signal::Signal;
 use super::*;
 use crate::answer::Answer;
 use crate::drive::{Direction, Fault, Faults, Setpoint, State};
-use crate::image::Image;
-use crate::params::BOSSO_MOTOR;
 use crate::tune::{Note, Player};
 use mavlink::dialects::ardupilotmega::{
     COMMAND_ACK_DATA, MavMessage, MavResult, PARAM_VALUE_DATA, STATUSTEXT_DATA,

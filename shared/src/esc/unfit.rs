@@ -1,9 +1,11 @@
 //! Parameters that make no drive. They are set one by one and in any order, so on the way to another motor they may
 //! not: then the motor is off, and the drive keeps the last configuration that could be built.
 
+use siskin_params::Params;
+
 use super::Esc;
+use crate::build::BuildError;
 use crate::mavlink::digits;
-use crate::params::{BuildError, Params};
 
 /// How long no parameter must have changed before the user is told that they do not fit, µs: while a file is loaded,
 /// that may pass.

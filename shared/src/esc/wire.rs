@@ -1,6 +1,7 @@
 //! What the throttle wire or a command makes the ESC do besides turning the motor: DShot commands, stick
 //! calibration, news.
 
+use siskin_params::ParamId;
 use siskin_throttle::News;
 use siskin_throttle::calibration::Step;
 use siskin_throttle::command::Beacon;
@@ -9,8 +10,8 @@ use siskin_throttle::endpoints::EndPoints;
 
 use super::Esc;
 use super::storage::Unstored;
+use crate::build::BuildError;
 use crate::mavlink::Act;
-use crate::params::{BuildError, ParamId};
 use crate::throttle::LockThrottle;
 use crate::tune::Tune;
 

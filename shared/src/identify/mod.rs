@@ -24,12 +24,12 @@ use fixed::types::I1F31;
 
 pub use report::{Figure, Line, Report};
 
+use siskin_params::choice::CtlDrive;
+use siskin_params::parts::Identification;
+use siskin_params::{Choice, Kind, ParamId, Params};
 use siskin_units::{Scale, Speed};
 
 use crate::drive::{Excitation, Phase, Ripple, Setpoint, Snapshot};
-use crate::params::choice::CtlDrive;
-use crate::params::{Choice, Kind, ParamId, Params};
-use crate::parts::Identification;
 use means::{EXCITED_POLLS, Means, OperatingPoint, SPUN_POLLS, seconds};
 use report::Motor;
 use shaft::Shaft;

@@ -1,6 +1,6 @@
 //! The results of an identification.
 
-use crate::params::ParamId;
+use siskin_params::ParamId;
 
 /// A motor's figures.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -7,7 +7,8 @@ use mavlink::dialects::ardupilotmega::{
     MISSION_REQUEST_LIST_DATA, MavSeverity, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA,
     PARAM_SET_DATA, SETUP_SIGNING_DATA,
 };
-
+use siskin_params::Image;
+use siskin_params::{ParamId, Params};
 use siskin_throttle::News;
 
 use super::command::{ACCEPTED, Command, Commands, FAILED, IDENTIFY, RUN_PREARM_CHECKS};
@@ -23,8 +24,6 @@ use super::signing::{Kept, Signing, Trust};
 use super::warnings::{Warning, Warnings};
 use super::{ftp, news};
 use crate::drive::Faults;
-use crate::image::Image;
-use crate::params::{ParamId, Params};
 
 mod send;
 

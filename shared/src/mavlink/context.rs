@@ -1,12 +1,13 @@
 //! The interface between the component and its caller.
 
+use siskin_params::{Board, Params};
 use siskin_throttle::access::Access;
 use siskin_throttle::authority::DriveStatus;
 
 use super::group::Four;
+use crate::build::BuildError;
 use crate::check;
 use crate::identify;
-use crate::params::{Board, BuildError, Params};
 use crate::record::Record;
 use crate::telemetry::Telemetry;
 

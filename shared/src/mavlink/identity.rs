@@ -2,11 +2,11 @@
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
+use siskin_params::choice::MavRole;
+use siskin_params::{ParamId, Params};
 
 use super::frame::{Address, Frame};
 use super::place::Place;
-use crate::params::choice::MavRole;
-use crate::params::{ParamId, Params};
 
 /// The ESC's role for a ground station (`MAV_ROLE`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,6 +3,8 @@
 use mavlink::dialects::ardupilotmega::{
     EscConnectionType, MavModeFlag, MavParamType, MavProtocolCapability, MavState,
 };
+use siskin_params::Image;
+use siskin_params::{ParamId, Params, TABLE};
 use siskin_throttle::signal::{Pulse, Signal};
 use siskin_units::math::{quotient, round};
 
@@ -10,8 +12,7 @@ use super::group::Escs;
 use super::identity::Identity;
 use super::payload::Payload;
 use crate::drive::Faults;
-use crate::image::{Image, PARTS, VERSION};
-use crate::params::{ParamId, Params, TABLE};
+use crate::image::{PARTS, VERSION};
 use crate::telemetry::Telemetry;
 
 /// `ESC_INFO.temperature` of a slot without an ESC, or whose ESC does not know it.

@@ -32,7 +32,7 @@ pub(crate) use command::NO_REBOOT_ARMED;
 pub use component::Component;
 pub use context::{Act, Context, Request};
 pub use frame::{Address, Frame};
-pub use ftp::{PARAMETER_METADATA, digits};
+pub use ftp::digits;
 pub use group::Four;
 pub use receiver::{Counters, Receiver};
 pub use schedule::Intervals;

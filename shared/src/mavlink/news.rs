@@ -1,7 +1,6 @@
 //! The throttle wire's news in words.
 
 use mavlink::dialects::ardupilotmega::MavSeverity;
-
 use siskin_throttle::News;
 use siskin_throttle::calibration::Step;
 

@@ -1,12 +1,13 @@
 //! The parameter protocol. Every value is REAL32: no encoding of integers works in every client.
 
+use siskin_params::{ParamId, TABLE};
+
 use super::context::Context;
 use super::frame::Address;
 use super::frame::Frame;
 use super::refusal::{NOT_PERMITTED, OUT_OF_RANGE, Refusal, WRONG_TYPE};
 use super::reply::{Replies, Reply};
 use super::signing::Trust;
-use crate::params::{ParamId, TABLE};
 
 /// `PARAM_REQUEST_READ.param_index` when the name counts.
 pub(super) const BY_NAME: i16 = -1;

@@ -1,8 +1,7 @@
 //! Why a parameter's value is rejected.
 
 use mavlink::dialects::ardupilotmega::MavParamError;
-
-use crate::params::{ParamId, SetError};
+use siskin_params::{ParamId, SetError};
 
 pub(super) const OUT_OF_RANGE: MavParamError = MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE;
 pub(super) const NOT_PERMITTED: MavParamError = MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED;

@@ -5,13 +5,13 @@ use mavlink::dialects::ardupilotmega::{
     COMMAND_ACK_DATA, MISSION_COUNT_DATA, MavParamError, MavResult, MavSeverity, PARAM_ERROR_DATA,
     STATUSTEXT_DATA,
 };
+use siskin_params::{ParamId, TABLE};
 
 use super::frame::Address;
 use super::ftp;
 use super::payload::id_of;
 use super::refusal::Refusal;
 use super::sender::Sender;
-use crate::params::{ParamId, TABLE};
 
 /// Replies that can wait. A poll empties the queue, so it holds the most that may arrive between
 /// two: 1 ms of a serial link carries at most one frame, a datagram of 1500 bytes 33 commands.

@@ -5,10 +5,10 @@ use mavlink::dialects::ardupilotmega::{
     ESC_INFO_DATA, ESC_STATUS_DATA, ESC_TELEMETRY_1_TO_4_DATA, HEARTBEAT_DATA,
     NAMED_VALUE_FLOAT_DATA,
 };
+use siskin_params::{ParamId, Params};
 
 use super::pace::Pace;
 use super::place::Place;
-use crate::params::{ParamId, Params};
 
 const SECOND_US: u64 = 1_000_000;
 

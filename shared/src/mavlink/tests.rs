@@ -15,15 +15,16 @@ use mavlink::{
 };
 use std::vec::Vec;
 
+use siskin_params::Board;
+use siskin_params::Image;
+use siskin_params::{BOSSO_BENCH, ParamId, Params};
 use siskin_throttle::authority::{Authority, Timing};
 
 use super::*;
+use crate::build::BuildError;
 use crate::check::Report;
 use crate::drive::{Faults, Limits, Phase};
 use crate::identify;
-use crate::image::Image;
-use crate::params::Board;
-use crate::params::{BOSSO_BENCH, BuildError, ParamId, Params};
 use crate::telemetry::{SIGNALS, Telemetry};
 
 pub(super) const TELEMETRY: Telemetry = Telemetry {

@@ -4,10 +4,10 @@ use core::sync::atomic::AtomicU32;
 use core::sync::atomic::Ordering::Relaxed;
 
 use heapless::Vec;
+use siskin_params::{Board, POLE_PAIRS};
 
 use super::{FAULTS, HELD, MAGIC, PERIODS, ROW, Record, place};
 use crate::drive::{Fault, Phase};
-use crate::params::{Board, POLE_PAIRS};
 
 /// Words before those of the record.
 const HEAD: usize = 3;

@@ -14,10 +14,10 @@ use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 pub use file::{FaultSeen, PeriodSeen, Recorded};
 
+use siskin_params::parts::Part;
 use siskin_units::{AdcCounts, Duty};
 
 use crate::drive::{Bridge, Config, Sample, State};
-use crate::parts::Part;
 
 /// True if this program keeps a record.
 pub const KEPT: bool = Part::Record.is_here();

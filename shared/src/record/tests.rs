@@ -2,9 +2,11 @@
 
 use std::vec::Vec;
 
+use siskin_params::{BOSSO_BENCH, Board, Params};
+
 use super::*;
+use crate::build::build;
 use crate::drive::{Fault, Phase, Setpoint, step};
-use crate::params::{BOSSO_BENCH, Board, Params, build};
 
 /// A drive at rest whose interrupt records what the tests say of its bridge.
 struct Bench {

@@ -1,7 +1,8 @@
 //! The stored values and their keys. A key is never reused for another value.
 
+use siskin_params::{ParamId, Params, TABLE};
+
 use crate::mavlink::{Intervals, KeptSigning, Key};
-use crate::params::{ParamId, Params, TABLE};
 use crate::statistics::Statistics;
 
 /// First key of the message intervals. Keys below 0x1000 are the parameters'.

@@ -3,12 +3,12 @@ use std::vec::Vec;
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+use siskin_params::{ParamId, Params, TABLE};
 
 use super::word::key;
 use super::word::{Word, Writer};
 use super::*;
 use crate::mavlink::{Intervals, KeptSigning, Key};
-use crate::params::{ParamId, Params, TABLE};
 use crate::statistics::Statistics;
 use flash::{PAGE, RANGE, RamFlash, WORD};
 use random::Random;

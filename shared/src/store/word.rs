@@ -1,9 +1,9 @@
 //! The words of a set, and its seal.
 
 use embedded_storage::nor_flash::NorFlash;
+use siskin_params::checksum::checksum;
 
 use super::error::StoreError;
-use crate::checksum::checksum;
 
 /// Keys of words that are not values; [`kept`](super::kept) has those of values.
 pub(super) mod key {

@@ -3,10 +3,10 @@
 use siskin_control::drive::{Setpoint, Snapshot, State};
 use siskin_control::esc::Esc;
 use siskin_control::mavlink::Request;
-use siskin_control::params::{BOSSO_MOTOR, ParamId, Params};
 use siskin_control::throttle::Throttle;
 use siskin_emulator::device::Latest;
 use siskin_emulator::rig::Bench;
+use siskin_params::{BOSSO_MOTOR, ParamId, Params};
 use siskin_throttle::answer::Ask;
 use siskin_throttle::line::{Event, Line};
 use siskin_throttle::signal::Signal;

@@ -2,8 +2,8 @@
 
 use cortex_m::Peripherals;
 use semihosting::{io, process};
+use siskin_control::build::build;
 use siskin_control::drive::Config;
-use siskin_control::params::build;
 use siskin_on_target::request;
 
 use crate::count::Counter;

@@ -1,11 +1,11 @@
 //! The chip's input: parameters and board first, then the inputs of each control period.
 
 use fixed::types::I1F31;
-use siskin_control::control::delay::Delay;
-use siskin_control::control::sensing::Shunts;
 use siskin_control::drive::{Excitation, Fault, Pull, Sample, Setpoint};
-use siskin_control::image::Image;
-use siskin_control::params::{BOSSO_BENCH, Board, Greatest, LeastDeadTime, ParamId, Params, TABLE};
+use siskin_params::Delay;
+use siskin_params::Image;
+use siskin_params::Shunts;
+use siskin_params::{BOSSO_BENCH, Board, Greatest, LeastDeadTime, ParamId, Params, TABLE};
 use siskin_units::{AdcCounts, Current, Speed};
 
 /// Words of the parameters and the board.

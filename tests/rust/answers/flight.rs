@@ -1,9 +1,9 @@
 //! A flight controller that sends frames at a steady rate, and everything that comes back.
 
 use siskin_control::drive::Snapshot;
-use siskin_control::params::{BOSSO_BENCH, ParamId};
 use siskin_emulator::device::{Device, Onlooker, Start};
 use siskin_emulator::rig::{Period, Rig};
+use siskin_params::{BOSSO_BENCH, ParamId};
 
 use super::reply::{Reply, levels};
 

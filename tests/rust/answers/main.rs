@@ -7,7 +7,7 @@ mod reply;
 use flight::{Answered, DSHOT600, Flight, KINDS, Kind};
 use reply::Reply;
 use siskin_control::drive::Snapshot;
-use siskin_control::params::ParamId;
+use siskin_params::ParamId;
 
 const STOP: u16 = 0;
 const HALF: u16 = 1048;

@@ -5,7 +5,7 @@ mod sender;
 mod serial;
 
 use sender::{FlightController, STOP};
-use siskin_control::params::ParamId;
+use siskin_params::ParamId;
 
 /// An eighth of the throttle range.
 const LOW: u16 = 300;

@@ -1,6 +1,6 @@
 //! Random words on an armed wire, and genuine links with errors.
 
-use siskin_control::params::ParamId;
+use siskin_params::ParamId;
 
 use super::sender::{FlightController, frame};
 

@@ -4,9 +4,9 @@
 use mavlink::dialects::ardupilotmega::{MavMessage, STATUSTEXT_DATA};
 use mavlink::{MavlinkVersion, Message, MessageData};
 use siskin_control::drive::Setpoint;
-use siskin_control::params::{BOSSO_BENCH, ParamId};
 use siskin_emulator::device::{Device, Onlooker, Start};
 use siskin_emulator::rig::{Period, Rig};
+use siskin_params::{BOSSO_BENCH, ParamId};
 use siskin_throttle::answer::gcr;
 use siskin_units::Speed;
 

@@ -2,8 +2,8 @@
 
 use siskin_control::drive::State;
 use siskin_control::esc::Esc;
-use siskin_control::params::{ParamId, Params};
 use siskin_emulator::rig::Bench;
+use siskin_params::{ParamId, Params};
 use siskin_throttle::dshot::{Frame, Rate, edges};
 
 const TICKS_PER_US: u64 = 170;

@@ -19,7 +19,7 @@ use std::{slice, thread};
 use counts::Counts;
 use record::{Act, Run};
 use siskin_control::drive::Phase;
-use siskin_control::params::{ParamId, Params};
+use siskin_params::{ParamId, Params};
 
 /// Instructions per control period of the default drive, including start-up and faults. At 24 kHz a 170 MHz chip has
 /// 7083 clocks per period, an 84 MHz one 3500.

@@ -3,11 +3,12 @@
 use std::mem::{Discriminant, discriminant};
 
 use fixed::types::I1F31;
+use siskin_control::build::build;
 use siskin_control::drive::{Config, Phase, Sample, Setpoint, State, step};
-use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_emulator::fault::InForce;
 use siskin_emulator::rig::{Bench, Rig};
 use siskin_on_target::{answer, request};
+use siskin_params::{BOSSO_BENCH, ParamId, Params};
 use siskin_units::{Current, Speed};
 
 /// The interrupt publishes its first snapshot in the first period, and each further one before the last is older than

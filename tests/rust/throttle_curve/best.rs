@@ -2,9 +2,9 @@
 
 use std::f64::consts::FRAC_2_PI;
 
-use siskin_control::params::ParamId;
 use siskin_emulator::plant::{Load, Motor, Supply};
 use siskin_emulator::scenario::Standing;
+use siskin_params::ParamId;
 
 use super::Row;
 

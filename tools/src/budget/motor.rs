@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use siskin_control::params::{FluxSettings, FromMotor, ParamId};
+use siskin_control::build::FluxSettings;
+use siskin_params::{FromMotor, ParamId};
 
 use super::limits::{HoldOff, Settings};
 use crate::cli::BudgetArgs;

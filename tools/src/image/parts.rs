@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use siskin_control::parts::Part;
+use siskin_params::parts::Part;
 
 /// What a list may hold besides single parts: the firmware's features.
 const CHOICES: [&str; 2] = ["flight", "papers"];

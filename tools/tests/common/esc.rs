@@ -7,12 +7,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use siskin_control::build::BuildError;
 use siskin_control::check::Report;
-use siskin_control::control::delay::Delay;
 use siskin_control::mavlink::{Component, Context, Frame, Receiver, Request, Warning, digits};
-use siskin_control::params::{BuildError, ParamId, Params};
 use siskin_control::telemetry::Telemetry;
 use siskin_emulator::plant::Sensing;
+use siskin_params::Delay;
+use siskin_params::{ParamId, Params};
 use siskin_throttle::authority::{Authority, Timing};
 
 use crate::run::{Run, siskin};

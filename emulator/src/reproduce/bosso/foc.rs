@@ -3,9 +3,10 @@
 
 use std::f64::consts::TAU;
 
-use siskin_control::control::delay::Delay;
+use siskin_control::build::build;
 use siskin_control::drive::{Bridge, Phase, Setpoint};
-use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
+use siskin_params::Delay;
+use siskin_params::{BOSSO_BENCH, ParamId, Params};
 
 use super::course::{Course, Legs};
 use super::means::{Means, seek};

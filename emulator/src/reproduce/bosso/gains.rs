@@ -4,10 +4,11 @@
 use std::f64::consts::TAU;
 
 use fixed::types::extra::Unsigned;
+use siskin_control::build::build;
 use siskin_control::control::PERIODS;
-use siskin_control::control::delay::Delay;
 use siskin_control::control::{observer, regulator, speed};
-use siskin_control::params::{BOSSO_BENCH, BOSSO_TABLE_III, Params, build};
+use siskin_params::Delay;
+use siskin_params::{BOSSO_BENCH, BOSSO_TABLE_III, Params};
 use siskin_units::Scale;
 use siskin_units::math::{Gain, Number};
 

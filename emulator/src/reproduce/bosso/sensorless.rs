@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use siskin_control::build::build;
 use siskin_control::drive::{Phase, Setpoint};
-use siskin_control::params::{BOSSO_BENCH, BOSSO_TABLE_III, ParamId, Params, build};
+use siskin_params::{BOSSO_BENCH, BOSSO_TABLE_III, ParamId, Params};
 
 use super::means::Means;
 use super::setting::{BUS_V, exact_sensing, load_nm};

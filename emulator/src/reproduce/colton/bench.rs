@@ -1,7 +1,8 @@
 //! The second paper's machines from the library, on the bench under its observer.
 
+use siskin_control::build::build;
 use siskin_control::drive::Setpoint;
-use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
+use siskin_params::{BOSSO_BENCH, ParamId, Params};
 use siskin_units::Scale;
 
 use crate::plant::{Load, Motor};

@@ -2,9 +2,10 @@
 
 use std::f64::consts::TAU;
 
+use siskin_control::build::FluxSettings;
 use siskin_control::control::observer::limits;
 use siskin_control::drive::Phase;
-use siskin_control::params::{FluxSettings, ParamId};
+use siskin_params::ParamId;
 
 use super::bench::quadrotor;
 use super::sheet::{between, evenly, figure};

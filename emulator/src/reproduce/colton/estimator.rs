@@ -4,13 +4,14 @@
 use std::f64::consts::TAU;
 
 use fixed::types::I0F32;
-use siskin_control::control::delay::Delay;
+use siskin_control::build::build;
 use siskin_control::control::observer;
 use siskin_control::control::observer::edges::{self, Sensors};
 use siskin_control::control::observer::flux_linkage::{self, HighPass};
 use siskin_control::control::observer::{crossing, position};
-use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
-use siskin_control::parts;
+use siskin_params::Delay;
+use siskin_params::parts;
+use siskin_params::{BOSSO_BENCH, ParamId, Params};
 use siskin_units::math::Gain;
 use siskin_units::{Angle, Current, FLUX_NOMINAL, Speed, Voltage};
 

@@ -3,9 +3,9 @@
 
 use std::f64::consts::TAU;
 
+use siskin_control::build::FluxSettings;
 use siskin_control::control::observer::limits;
 use siskin_control::drive::{Phase, Setpoint};
-use siskin_control::params::FluxSettings;
 
 use super::bench::{Drive, scooter};
 use super::sheet::{between, evenly, figure, over};

@@ -1,8 +1,9 @@
 use core::f64::consts::TAU;
 use proptest::prelude::*;
+use siskin_params::{BOSSO_BENCH, Board, ParamId, Params};
 
 use super::*;
-use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
+use crate::build::build;
 
 const POLE_PAIRS: f64 = 12.0;
 const FLUX_WB: f64 = 1.3e-3;

@@ -5,6 +5,7 @@
 
 use fixed::types::I4F28;
 use fixed::types::extra::U28;
+use siskin_params::Delay;
 use siskin_units::dimension::TurnPerPeriod;
 use siskin_units::math::{
     Gain, Held, Quantity, SinCos, TopProduct, atan2_turns, divide, magnitude,
@@ -13,7 +14,6 @@ use siskin_units::traced;
 use siskin_units::{Angle, Current, CurrentRate, Flux, InverseFlux, Speed, Voltage, stated_emf};
 
 use super::{Estimate, SlowEstimate};
-use crate::control::delay::Delay;
 use crate::control::regulator::Feedback;
 use crate::control::transform::{Dq, rotate_frame};
 

@@ -3,6 +3,7 @@
 //!
 //! Forward rotation only: for the other direction the drive swaps phases b and c in all inputs.
 
+use siskin_params::parts;
 use siskin_units::traced;
 use siskin_units::{Angle, Current, Speed, Voltage};
 
@@ -10,7 +11,6 @@ use super::crossing::{self, Crossing};
 use super::flux_linkage;
 use super::hall::{self, Step};
 use super::position::{self, Periods};
-use crate::parts;
 
 /// The source of the edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -14,6 +14,7 @@ pub mod limits;
 pub mod position;
 pub mod sector;
 
+use siskin_params::parts;
 use siskin_units::math::{EIGHTH_PI, SinCos, TopProduct};
 use siskin_units::trace::Trace;
 use siskin_units::{Angle, Current, FLUX_NOMINAL, Flux, Speed, Voltage, WideVoltage, wide};
@@ -21,7 +22,6 @@ use siskin_units::{Angle, Current, FLUX_NOMINAL, Flux, Speed, Voltage, WideVolta
 use super::inductance::Factor;
 use super::regulator::Feedback;
 use super::transform::{AlphaBeta, Dq, phases};
-use crate::parts;
 pub use estimate::{Estimate, Input, SlowEstimate};
 
 /// The selected observer (`CTL_OBSERVER`) and its coefficients.

@@ -9,12 +9,12 @@ pub mod observer_based;
 mod reference;
 pub mod synchronous;
 
+use siskin_params::parts;
 use siskin_units::traced;
 use siskin_units::{Current, Speed, Voltage, WideVoltage, wide};
 
 use super::inductance::Factor;
 use super::transform::Dq;
-use crate::parts;
 pub use reference::{Feedback, Reference};
 
 /// One of the regulators and its coefficients (`CTL_REGULATOR`).

@@ -15,7 +15,6 @@
 //! seen above first.
 
 use fixed::types::I16F16;
-
 use siskin_units::Voltage;
 use siskin_units::math::{Held, divide};
 use siskin_units::traced;

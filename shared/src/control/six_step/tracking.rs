@@ -1,12 +1,12 @@
 //! Tracking from crossing to crossing: the rotor's angle and speed, and when the next commutation is due.
 
 use fixed::types::I16F16;
+use siskin_params::Delay;
 use siskin_units::math::{Held, divide};
 use siskin_units::traced;
 use siskin_units::{Angle, Speed};
 
 use super::commutation::{HALF_SEXTANT, SEXTANT};
-use crate::control::delay::Delay;
 
 /// Consecutive crossings after which the rotor's motion is known well enough to smooth.
 pub const KNOWN: u8 = 6;
@@ -163,8 +163,9 @@ fn bounded(turn_bits: i64) -> Angle {
 
 #[cfg(test)]
 mod tests {
+    use siskin_params::parts;
+
     use super::*;
-    use crate::parts;
 
     const NONE: Delay = Delay::None(parts::Bench::HERE);
     const HALF: Delay = Delay::Half(parts::Bench::HERE);

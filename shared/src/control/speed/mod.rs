@@ -4,12 +4,12 @@ pub mod feed_forward;
 mod input;
 pub mod nested;
 
+use siskin_params::parts;
 use siskin_units::traced;
 use siskin_units::{Current, Speed, stated_torque};
 
 use super::planner;
 use super::regulator::Reference;
-use crate::parts;
 pub use input::{Bounds, Input};
 
 /// The planner and one of the laws.

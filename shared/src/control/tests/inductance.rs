@@ -1,10 +1,10 @@
 //! Inductance adaptation on a flux estimate like an observer's.
 
+use siskin_params::ParamId;
 use siskin_units::Flux;
 
 use super::{L, PHI, TS, Units, config_with};
 use crate::control::inductance::{Factor, State, step};
-use crate::params::ParamId;
 
 use fixed::types::I2F30;
 

@@ -2,6 +2,7 @@
 
 use std::vec::Vec;
 
+use siskin_params::ParamId;
 use siskin_units::{AdcCounts, Current};
 
 use super::motor::{Loop, Motor};
@@ -11,7 +12,6 @@ use crate::control::observer::SlowEstimate;
 use crate::control::regulator::Reference;
 use crate::control::speed::{self, Bounds};
 use crate::control::{torque, voltage};
-use crate::params::ParamId;
 use crate::protection;
 
 use fixed::types::I1F31;

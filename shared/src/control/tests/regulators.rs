@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
+use siskin_params::ParamId;
 use siskin_units::{Current, Voltage, WideVoltage};
 
 use super::motor::{Loop, Motor};
@@ -10,7 +11,6 @@ use super::{K_IE, K_PE, L, P, PHI, R, TABLE_III, TS, Units, config_with, near};
 use crate::control::inductance::Factor;
 use crate::control::regulator::{Feedback, Reference, State};
 use crate::control::transform::Dq;
-use crate::params::ParamId;
 
 /// `CTL_REGULATOR`.
 const ALL: [f32; 3] = [0.0, 1.0, 2.0];

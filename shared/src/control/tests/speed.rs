@@ -1,6 +1,7 @@
 //! The speed regulators against their equations.
 
 use proptest::prelude::*;
+use siskin_params::ParamId;
 use siskin_units::trace::Trace;
 use siskin_units::{Current, Torque};
 
@@ -8,7 +9,6 @@ use super::{K_I_OMEGA, K_P_OMEGA, P, PHI, TABLE_III, TS, Units, config_with, nea
 use crate::control::PERIODS;
 use crate::control::observer::SlowEstimate;
 use crate::control::speed::{Bounds, Input, State};
-use crate::params::ParamId;
 
 /// `CTL_SPEED`.
 const FEED_FORWARD: f32 = 1.0;

@@ -1,10 +1,10 @@
 //! Coefficients of the six-step drive.
 
 use fixed::types::I1F31;
+use siskin_params::Delay;
 use siskin_units::math::Gain;
 use siskin_units::{AdcCounts, Angle, Current, Speed, Voltage};
 
-use crate::control::delay::Delay;
 use crate::control::planner;
 use crate::control::six_step::{crossing, duty};
 

@@ -1,7 +1,6 @@
 //! Coefficients of the tones.
 
 use fixed::types::I1F31;
-
 use siskin_units::math::Gain;
 use siskin_units::{Current, Speed, Voltage};
 

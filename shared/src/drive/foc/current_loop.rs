@@ -1,10 +1,10 @@
 //! The current loop: from the sampled currents to the phase duties.
 
+use siskin_params::Delay;
 use siskin_units::math::{Held, SinCos, TopProduct, sin_cos};
 use siskin_units::{Current, Duty, Speed, Voltage, WideVoltage};
 
 use super::state::{Loops, State};
-use crate::control::delay::Delay;
 use crate::control::modulator::{Phases, Supply};
 use crate::control::observer::Input;
 use crate::control::transform::{AlphaBeta, Dq, PhaseOrder, inverse_park, park, rotate, voltages};

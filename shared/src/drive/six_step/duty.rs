@@ -228,9 +228,11 @@ pub(super) fn bridge(
 
 #[cfg(test)]
 mod tests {
+    use siskin_params::Shunts;
+    use siskin_params::{BOSSO_BENCH, Board, ParamId, Params};
+
     use super::*;
-    use crate::control::sensing::Shunts;
-    use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
+    use crate::build::build;
 
     #[test]
     fn the_throttle_ends_where_the_duty_does_with_two_shunts_and_three() {

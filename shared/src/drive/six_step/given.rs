@@ -1,6 +1,7 @@
 //! Commutation by a given rotor position, from standstill, without Park, Ramp and crossings.
 
 use fixed::types::{I1F31, I2F30};
+use siskin_params::parts::Bench;
 use siskin_units::math::TopProduct;
 use siskin_units::{Angle, Speed, Voltage, stated_emf};
 
@@ -12,7 +13,6 @@ use crate::control::six_step::commutation::Sector;
 use crate::drive::config::Config;
 use crate::drive::config::six_step;
 use crate::drive::shared::Shared;
-use crate::parts::Bench;
 
 /// Mean back-EMF between two phases over a sextant, relative to a phase's peak: √3·3/π.
 const BETWEEN_PHASES: I2F30 = I2F30::lit("1.6539867");

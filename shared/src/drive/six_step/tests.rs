@@ -1,12 +1,13 @@
 //! The six-step drive on synthetic samples. Tests with a motor model cover how it turns one.
 
 use fixed::types::I1F31;
+use siskin_params::{BOSSO_BENCH, Board, ParamId, Params};
 use siskin_units::{AdcCounts, Current, Duty, Speed};
 
+use crate::build::build;
 use crate::control::six_step::commutation::Sector;
 use crate::drive::io::in_order;
 use crate::drive::{Bridge, Config, Fault, Phase, Sample, Setpoint, State, step};
-use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
 
 fn drive(changes: &[(ParamId, f32)]) -> (Config, State) {
     let mut params = Params::of(&BOSSO_BENCH);
@@ -85,7 +86,7 @@ fn a_start_seeks_the_rotor_by_two_phases_while_the_third_floats() {
 #[test]
 fn a_rotor_whose_position_is_told_is_driven_from_where_it_stands() {
     let (config, _) = drive(&[(ParamId::Inp3d, 1.0)]);
-    let config = config.with_position_given(crate::parts::Bench::HERE);
+    let config = config.with_position_given(siskin_params::parts::Bench::HERE);
     for (sector, backwards) in [(Sector::Ab, false), (Sector::Bc, false), (Sector::Ca, true)] {
         let mut state = State::new(&config);
         let sign = if backwards { -1 } else { 1 };

@@ -20,7 +20,9 @@ struct Flight {
 impl Flight {
     fn new(changes: &[(ParamId, f32)]) -> Self {
         let mut bench = Bench::new(changes);
-        bench.config = bench.config.with_position_given(crate::parts::Bench::HERE);
+        bench.config = bench
+            .config
+            .with_position_given(siskin_params::parts::Bench::HERE);
         let theta = Angle::ZERO;
         Self {
             bench,

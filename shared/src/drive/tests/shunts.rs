@@ -1,9 +1,10 @@
 //! Two shunts: the third phase follows from the other two.
 
+use siskin_params::BOSSO_MOTOR;
+use siskin_params::Shunts;
+use siskin_params::choice::StaMode;
+
 use super::*;
-use crate::control::sensing::Shunts;
-use crate::params::BOSSO_MOTOR;
-use crate::params::choice::StaMode;
 
 /// Readings of phase c, which has no sensor.
 const NONSENSE_A: [f64; 4] = [0.0, 39.0, -39.0, 7.3];

@@ -1,10 +1,10 @@
 //! A turning motor's resistance and flux: when they are followed, and what forgets them.
 
+use siskin_params::choice::{CtlAdaptL, CtlDrive, CtlObserver};
 use siskin_units::{Current, FLUX_NOMINAL, Flux, Speed, Voltage};
 
 use super::*;
 use crate::drive::Drift;
-use crate::params::choice::{CtlAdaptL, CtlDrive, CtlObserver};
 
 /// More samples than pass between two changes of the values in force.
 const FOLLOWED_MS: u32 = 1200;

@@ -1,14 +1,14 @@
 //! Commands that turn the motor briefly, make it sound, or set its direction.
 
 use mavlink::dialects::ardupilotmega::{ActuatorConfiguration, MavResult, MotorTestThrottleType};
+use siskin_params::choice::Inp3d;
+use siskin_params::{ParamId, Params};
 use siskin_throttle::authority::TestError;
 
 use super::{
     ACCEPTED, ACTUATOR_TEST, Act, Command, Commands, Context, DENIED, DriveStatus, Replies,
     Request, TEMPORARILY_REJECTED,
 };
-use crate::params::choice::Inp3d;
-use crate::params::{ParamId, Params};
 
 const PERCENT: i32 = MotorTestThrottleType::MOTOR_TEST_THROTTLE_PERCENT as i32;
 const PWM: i32 = MotorTestThrottleType::MOTOR_TEST_THROTTLE_PWM as i32;

@@ -6,6 +6,7 @@ use mavlink::dialects::ardupilotmega::{
     HEARTBEAT_DATA, MESSAGE_INTERVAL_DATA, MavParamError, MavSeverity, NAMED_VALUE_FLOAT_DATA,
     PARAM_VALUE_DATA,
 };
+use siskin_params::{ParamId, Params};
 
 use super::{Component, Context};
 use crate::image::VERSION_TEXT;
@@ -16,7 +17,6 @@ use crate::mavlink::payload::{Payload, id_of};
 use crate::mavlink::reply::Reply;
 use crate::mavlink::schedule::{self, Stream};
 use crate::mavlink::{check, ftp, messages, parameter};
-use crate::params::{ParamId, Params};
 use crate::telemetry::SIGNALS;
 
 /// FILE_TRANSFER_PROTOCOL.

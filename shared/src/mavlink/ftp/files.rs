@@ -1,21 +1,16 @@
 //! The files, and the folders that they are in.
 
+use siskin_params::ParamId;
+use siskin_params::checksum::checksum;
+use siskin_params::metadata::{GENERAL, PARAMETER};
+use siskin_params::parts::Part;
+
 use super::error::Error;
 use super::packed::Selection;
 use super::sink::Sink;
 use super::text;
 use super::view::View;
-use crate::checksum::checksum;
-use crate::params::ParamId;
-use crate::parts::Part;
 use crate::record::{self, Record};
-
-const GENERAL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz"));
-const PARAMETER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/parameter.json.xz"));
-
-/// The metadata of all parameters as ground stations read it, as JSON, for programs that have the table at hand. No
-/// image holds it: what is served is compressed.
-pub const PARAMETER_METADATA: &str = include_str!(concat!(env!("OUT_DIR"), "/parameter.json"));
 
 /// Checksum of the general metadata.
 pub(super) const GENERAL_CHECKSUM: u32 = checksum(0, GENERAL);

@@ -2,11 +2,11 @@
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::COMPONENT_METADATA_DATA;
+use siskin_params::parts::Part;
 use siskin_units::math::quotient;
 
 use super::files::GENERAL_CHECKSUM;
 use super::sink::Sink;
-use crate::parts::Part;
 
 /// COMPONENT_INFORMATION, superseded by COMPONENT_METADATA; older ground stations ask for it.
 const COMPONENT_INFORMATION_ID: u32 = 395;

@@ -28,7 +28,6 @@ mod text;
 mod view;
 
 pub(super) use answer::{Answer, PAYLOAD_MAX};
-pub use files::PARAMETER_METADATA;
 pub(super) use metadata::{is_metadata, metadata};
 pub(super) use server::Server;
 pub use text::digits;

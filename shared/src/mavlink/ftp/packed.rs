@@ -7,9 +7,10 @@
 //! ArduPilot pads with zeros so that no value straddles two reads; that is unnecessary here, since a file that changes
 //! can no longer be read.
 
+use siskin_params::Board;
+use siskin_params::{ParamId, Params};
+
 use super::sink::Sink;
-use crate::params::Board;
-use crate::params::{ParamId, Params};
 
 const MAGIC: u16 = 0x671B;
 const MAGIC_WITH_DEFAULTS: u16 = 0x671C;

@@ -1,6 +1,6 @@
 //! Receives the bytes of a file as it is written.
 
-use crate::checksum::checksum;
+use siskin_params::checksum::checksum;
 
 /// Keeps the bytes that fit, from an offset on, and measures the whole.
 #[derive(Debug, Default)]

@@ -4,15 +4,16 @@ use std::format;
 use std::string::String;
 use std::vec::Vec;
 
+use siskin_params::checksum::checksum;
+use siskin_params::{Board, LeastDeadTime};
+use siskin_params::{ParamId, Params, TABLE};
+
 use super::files::{Entry, File};
 use super::sink::Sink;
 use super::*;
 use crate::check::Report;
-use crate::checksum::checksum;
 use crate::identify;
 use crate::mavlink::tests::TELEMETRY;
-use crate::params::{Board, LeastDeadTime};
-use crate::params::{ParamId, Params, TABLE};
 
 static CHECK: Report = Report::new(40.0, 0.02);
 static IDENTIFICATION: identify::Report = identify::Report {

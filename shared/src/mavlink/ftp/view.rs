@@ -1,8 +1,9 @@
 //! The sources of the files.
 
+use siskin_params::{Board, Params};
+
 use crate::check;
 use crate::identify;
-use crate::params::{Board, Params};
 use crate::record::Record;
 use crate::telemetry::Telemetry;
 

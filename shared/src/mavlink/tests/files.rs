@@ -1,9 +1,9 @@
 //! A client that reads files, written from the protocol's description.
 
 use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, FILE_TRANSFER_PROTOCOL_DATA};
+use siskin_params::TABLE;
 
 use super::*;
-use crate::params::TABLE;
 
 mod contents;
 mod flood;

@@ -2,9 +2,9 @@ use mavlink::dialects::ardupilotmega::{
     MavParamError, MavParamType, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA,
 };
 use mavlink::types::CharArray;
+use siskin_params::TABLE;
 
 use super::*;
-use crate::params::TABLE;
 
 fn name(text: &str) -> CharArray<16> {
     let mut bytes = [0; 16];

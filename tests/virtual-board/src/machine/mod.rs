@@ -5,7 +5,6 @@ mod faults;
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use siskin_control::esc::obey;
 use siskin_control::mavlink::Request;
-use siskin_control::params::Params;
 use siskin_control::store;
 use siskin_emulator::device::Start;
 use siskin_emulator::fault::{Fault, Timeline};
@@ -15,6 +14,7 @@ use siskin_emulator::machine::{Machine, Onlooker, Stopped};
 use siskin_emulator::summary::Rejected;
 use siskin_emulator::surroundings::Surroundings as Bench;
 use siskin_emulator::wire::Wire;
+use siskin_params::Params;
 
 use crate::chip::flash::{Change, Flash};
 use crate::chip::{CODE, Cause, STORE};

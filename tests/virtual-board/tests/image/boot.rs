@@ -3,10 +3,11 @@
 use std::hash::Hasher;
 use std::ops::Range;
 
+use siskin_params::ParamId;
+
 use crate::common::{Board, MS, Throttle, image};
 use mavlink::dialects::ardupilotmega::{MavCmd, PARAM_REQUEST_READ_DATA, PARAM_VALUE_DATA};
 use mavlink::{MAVLinkV2MessageRaw, MavHeader};
-use siskin_control::params::ParamId;
 use siskin_emulator::link::LinkId;
 use siskin_emulator::machine::Machine as _;
 use siskin_vboard::processor::Access;

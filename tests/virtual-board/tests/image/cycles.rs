@@ -1,9 +1,9 @@
 //! How long the interrupt takes in each mode, up to the highest PWM frequency that is accepted. Run with `--release`.
 
 use mavlink::dialects::ardupilotmega::{COMMAND_ACK_DATA, MavCmd, MavResult};
-use siskin_control::params::{ParamId, PwmBound};
 use siskin_emulator::fault::InForce;
 use siskin_firmware::circuit::b_g431b_esc1::BOARD;
+use siskin_params::{ParamId, PwmBound};
 use siskin_vboard::image::Image;
 use siskin_vboard::load::Figures;
 use siskin_vboard::time::CLOCK_HZ;

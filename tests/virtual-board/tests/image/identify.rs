@@ -1,7 +1,7 @@
 //! The image identifies its motor. Run with `--release`.
 
 use mavlink::dialects::ardupilotmega::{COMMAND_ACK_DATA, MavCmd, MavResult};
-use siskin_control::params::ParamId;
+use siskin_params::ParamId;
 use siskin_vboard::chip::Cause;
 
 use crate::common::{Board, MS, Throttle, image};

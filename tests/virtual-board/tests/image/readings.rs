@@ -1,8 +1,8 @@
 //! The image reads the truth even where the chip or the board is less than ideal. Run with `--release`.
 
 use mavlink::dialects::ardupilotmega::ESC_INFO_DATA;
-use siskin_control::params::ParamId;
 use siskin_firmware::circuit::b_g431b_esc1::{BOARD, ZERO_COUNTS};
+use siskin_params::ParamId;
 
 use crate::common::{Board, MS, Throttle, US, image};
 

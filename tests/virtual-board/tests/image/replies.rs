@@ -3,7 +3,7 @@
 //! being sent. Run with `--release`.
 
 use mavlink::dialects::ardupilotmega::{PARAM_REQUEST_LIST_DATA, PARAM_VALUE_DATA};
-use siskin_control::params::ParamId;
+use siskin_params::ParamId;
 
 use crate::common::{
     BIDIRECTIONAL_300, BIDIRECTIONAL_600, BIDIRECTIONAL_1200, Board, MS, Scope, Throttle, image,

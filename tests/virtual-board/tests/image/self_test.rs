@@ -1,9 +1,9 @@
 //! The image tests its board: a sound one passes, and each defect is named. Run with `--release`.
 
 use mavlink::dialects::ardupilotmega::{COMMAND_ACK_DATA, MavCmd, MavResult};
-use siskin_control::params::ParamId;
 use siskin_emulator::fault::InForce;
 use siskin_emulator::plant::Gate;
+use siskin_params::ParamId;
 use siskin_vboard::chip::comparator::Defect;
 use siskin_vboard::time::ns;
 

@@ -3,14 +3,15 @@
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
+use siskin_params::Delay;
+use siskin_params::parts;
+use siskin_params::{BOSSO_BENCH, Board, ParamId, Params};
 use siskin_units::{Scale, Voltage};
 
 use super::*;
+use crate::build::build;
 use crate::control::PERIODS;
-use crate::control::delay::Delay;
 use crate::control::observer;
-use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
-use crate::parts;
 
 const NONE: Delay = Delay::None(parts::Bench::HERE);
 const HALF: Delay = Delay::Half(parts::Bench::HERE);

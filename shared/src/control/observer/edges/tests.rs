@@ -4,12 +4,13 @@ use proptest::prelude::*;
 use std::f64::consts::TAU;
 use std::vec::Vec;
 
+use siskin_params::parts;
+use siskin_params::{BOSSO_BENCH, Board, ParamId, Params};
 use siskin_units::Scale;
 
 use super::*;
+use crate::build::build;
 use crate::control::observer::{self, sector::Sector};
-use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
-use crate::parts;
 
 const CROSSINGS: Sensors = Sensors::None(parts::FluxCrossings::HERE);
 const HALL: Sensors = Sensors::Hall(parts::Hall::HERE);

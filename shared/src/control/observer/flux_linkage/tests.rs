@@ -3,11 +3,12 @@
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
+use siskin_params::{BOSSO_BENCH, Board, ParamId, Params};
 use siskin_units::Scale;
 
 use super::*;
+use crate::build::build;
 use crate::control::observer;
-use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
 
 const R: f64 = 0.108;
 const L: f64 = 30.6e-6;

@@ -4,10 +4,11 @@
 //! `exchange`: which reading is what, how long a set-point lives, what a break does to it, and what a duty
 //! is in timer clocks.
 
+use siskin_control::build::build;
 use siskin_control::drive::{Bridge, Config, Fault, Sample, Setpoint, State, step};
-use siskin_control::params::{BOSSO_MOTOR, Params, build};
 use siskin_firmware::circuit::b_g431b_esc1::{BOARD, ZERO_COUNTS};
 use siskin_firmware::exchange::word::unpack;
+use siskin_params::{BOSSO_MOTOR, Params};
 use siskin_units::{AdcCounts, Duty};
 use siskin_vboard::time::CLOCK_HZ;
 

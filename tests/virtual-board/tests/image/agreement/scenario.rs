@@ -1,11 +1,11 @@
 //! The throttle that both tests play, and the board that takes it.
 
-use siskin_control::params::ParamId;
 use siskin_emulator::device::Start;
 use siskin_emulator::machine::{Machine, Onlooker};
 use siskin_emulator::plant::{Fidelity, Sensing};
 use siskin_emulator::rig::Bench;
 use siskin_firmware::circuit::b_g431b_esc1::BOARD;
+use siskin_params::ParamId;
 use siskin_throttle::dshot::{Frame, Rate, check_mask};
 use siskin_throttle::signal::Signal;
 use siskin_vboard::image::Image;

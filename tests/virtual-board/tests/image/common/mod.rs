@@ -16,12 +16,12 @@ use mavlink::dialects::ardupilotmega::{
 };
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, MessageData};
 use siskin_control::mavlink::{Address, Receiver};
-use siskin_control::params::ParamId;
 use siskin_emulator::device::Start;
 use siskin_emulator::machine::{Machine, Onlooker};
 use siskin_emulator::plant::Gate;
 use siskin_emulator::rig::{Period, Rig};
 use siskin_emulator::surroundings::{Motion, Passage};
+use siskin_params::ParamId;
 use siskin_throttle::dshot::{Frame as Dshot, check_mask};
 use siskin_vboard::chip::Cause;
 use siskin_vboard::image::Image;
