@@ -67,7 +67,7 @@ const FIELD_ORIENTED_BOUND: PwmBound = PwmBound {
 };
 
 /// Those of an image with parts of the papers.
-const PWM_BOUNDS: [PwmBound; 5] = [
+const PWM_BOUNDS: [PwmBound; 6] = [
     PwmBound {
         choice: (ParamId::CtlObserver, 1.0),
         hz: 30_000.0,
@@ -82,6 +82,11 @@ const PWM_BOUNDS: [PwmBound; 5] = [
         choice: (ParamId::CtlObserver, 0.0),
         hz: 36_000.0,
         refusal: "at most 36000 with CTL_OBSERVER 0",
+    },
+    PwmBound {
+        choice: (ParamId::CtlRegulator, 2.0),
+        hz: 50_000.0,
+        refusal: "at most 50000 with CTL_REGULATOR 2",
     },
     SIX_STEP_BOUND,
     FIELD_ORIENTED_BOUND,
