@@ -81,7 +81,8 @@ pub const BOSSO_BENCH: Preset = Preset {
     ],
 };
 
-/// A 5-inch racing motor, whose coefficients the tests calculate by hand: R 33 mΩ, L 12 µH, 0.3215 mWb, 7 pole pairs, 63 g·cm²; 40 A, 20 V, 48 kHz, 200 ns. The rest follows.
+/// A 5-inch racing motor, whose coefficients the tests calculate by hand: R 33 mΩ, L 12 µH, 0.3215 mWb, 7 pole pairs,
+/// 63 g·cm²; 40 A, 20 V, 48 kHz, 200 ns. The rest follows.
 pub const RACING: [(ParamId, f32); 11] = [
     (ParamId::CtlRpmMin, 0.0),
     (ParamId::MotPolePairs, 7.0),

@@ -5,12 +5,12 @@
 
 use core::f32::consts::TAU;
 
-use siskin_params::RACING;
 use siskin_params::choice::{CtlDrive, CtlObsCure, CtlObserver, CtlRegulator};
-use siskin_params::{BOSSO_MOTOR, Board, ParamId, Params};
+use siskin_params::{BOSSO_MOTOR, Board, ParamId, Params, RACING};
 use siskin_units::{Current, Speed};
 
 use super::si::Si;
+use super::tests::over;
 use super::{low_speed, observer, outer, sensing, start};
 use crate::control::speed::Bounds;
 use crate::control::{dead_time, observer as observers, torque};
@@ -19,10 +19,7 @@ use crate::drive::config::six_step;
 
 /// Returns what a block makes of that motor with these changes.
 fn made<T>(changes: &[(ParamId, f32)], block: impl FnOnce(&Si) -> T) -> T {
-    let mut params = Params::of(&BOSSO_MOTOR);
-    for (id, value) in RACING.iter().chain(changes) {
-        params.set(*id, *value).expect("in range");
-    }
+    let params = over(over(Params::of(&BOSSO_MOTOR), &RACING), changes);
     block(&Si::new(&params.in_force(), &Board::BENCH, Drift::NONE))
 }
 

@@ -104,14 +104,11 @@ mod tests {
 
     use super::*;
     use crate::build::build;
+    use crate::build::tests::over;
     use core::f32::consts::TAU;
 
     fn config(changes: &[(ParamId, f32)]) -> crate::drive::Config {
-        let mut params = Params::of(&BOSSO_BENCH);
-        for (id, value) in changes {
-            params.set(*id, *value).expect("in range");
-        }
-        build(&params, &Board::BENCH).expect("it makes a drive")
+        build(&over(Params::of(&BOSSO_BENCH), changes), &Board::BENCH).expect("it makes a drive")
     }
 
     /// Returns amperes, rpm/s and seconds of Park for each attempt.

@@ -4,11 +4,17 @@ mod assumed;
 mod preset;
 mod pwm;
 
-use siskin_params::BOSSO_MOTOR;
-use siskin_params::Delay;
-use siskin_params::{LeastDeadTime, PwmBound};
+use siskin_params::{BOSSO_MOTOR, Delay, LeastDeadTime, PwmBound};
 
 use super::*;
+
+/// Returns parameters with these values set.
+pub(super) fn over(mut params: Params, values: &[(ParamId, f32)]) -> Params {
+    for (id, value) in values {
+        params.set(*id, *value).expect("in range");
+    }
+    params
+}
 
 #[test]
 fn the_defaults_make_a_drive() {
@@ -17,29 +23,29 @@ fn the_defaults_make_a_drive() {
 
 #[test]
 fn nothing_stays_of_what_was_in_the_place_before() {
-    let mut others = Params::of(&BOSSO_MOTOR);
-    for (id, value) in [
-        (ParamId::CtlObserver, 2.0),
-        (ParamId::CtlRegulator, 2.0),
-        (ParamId::CtlSpeed, 1.0),
-        (ParamId::CtlAdaptL, 1.0),
-        (ParamId::CtlDrive, 1.0),
-        (ParamId::CtlModulation, 1.0),
-        (ParamId::MotDir, 1.0),
-        (ParamId::MotStop, 0.0),
-        (ParamId::MotToneA, 0.0),
-        (ParamId::MotRMohm, 54.0),
-        (ParamId::MotLUh, 20.0),
-        (ParamId::MotFluxMwb, 1.5),
-        (ParamId::Inp3d, 1.0),
-        (ParamId::LimPhaseA, 15.0),
-        (ParamId::PwmFreqHz, 30_000.0),
-        (ParamId::PwmDeadtimeNs, 700.0),
-        (ParamId::StaRampA, 3.0),
-        (ParamId::StaRunRpm, 400.0),
-    ] {
-        others.set(id, value).expect("in range");
-    }
+    let others = over(
+        Params::of(&BOSSO_MOTOR),
+        &[
+            (ParamId::CtlObserver, 2.0),
+            (ParamId::CtlRegulator, 2.0),
+            (ParamId::CtlSpeed, 1.0),
+            (ParamId::CtlAdaptL, 1.0),
+            (ParamId::CtlDrive, 1.0),
+            (ParamId::CtlModulation, 1.0),
+            (ParamId::MotDir, 1.0),
+            (ParamId::MotStop, 0.0),
+            (ParamId::MotToneA, 0.0),
+            (ParamId::MotRMohm, 54.0),
+            (ParamId::MotLUh, 20.0),
+            (ParamId::MotFluxMwb, 1.5),
+            (ParamId::Inp3d, 1.0),
+            (ParamId::LimPhaseA, 15.0),
+            (ParamId::PwmFreqHz, 30_000.0),
+            (ParamId::PwmDeadtimeNs, 700.0),
+            (ParamId::StaRampA, 3.0),
+            (ParamId::StaRunRpm, 400.0),
+        ],
+    );
     let board = Board {
         shunts: Shunts::Two,
         delay: Delay::Half(parts::Bench::HERE),
@@ -118,11 +124,7 @@ fn a_pwm_frequency_above_that_of_a_choice_in_force_is_refused() {
         ..Board::BENCH
     };
     let of = |settings: &[(ParamId, f32)]| {
-        let mut params = Params::of(&BOSSO_MOTOR);
-        for (id, value) in settings {
-            params.set(*id, *value).expect("in range");
-        }
-        build(&params, &board).err()
+        build(&over(Params::of(&BOSSO_MOTOR), settings), &board).err()
     };
     let observed = (ParamId::CtlObserver, 1.0);
     let pwm = |hz| (ParamId::PwmFreqHz, hz);

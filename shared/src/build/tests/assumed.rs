@@ -3,6 +3,7 @@
 use siskin_params::choice::{CtlDrive, CtlMode};
 use siskin_params::{BOSSO_MOTOR, Board, ParamId, Params};
 
+use super::over;
 use crate::build::build;
 
 fn with(values: &[(ParamId, f32)]) -> Params {
@@ -11,13 +12,6 @@ fn with(values: &[(ParamId, f32)]) -> Params {
 
 fn out_of_the_bag(values: &[(ParamId, f32)]) -> Params {
     over(Params::default(), values)
-}
-
-fn over(mut params: Params, values: &[(ParamId, f32)]) -> Params {
-    for (id, value) in values {
-        params.set(*id, *value).expect("in range");
-    }
-    params
 }
 
 #[test]

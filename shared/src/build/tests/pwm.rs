@@ -2,27 +2,28 @@
 
 use siskin_params::{Board, ParamId, Params};
 
+use super::over;
 use crate::build::build;
 
 /// A gimbal's motor of 140 rpm/V, with 7 pole pairs, at 12 V; its ESC measures up to 2 A.
 #[test]
 fn a_slow_motor_gets_what_the_numbers_allow() {
-    let mut params = Params::default();
-    for (id, value) in [
-        (ParamId::MotPolePairs, 7.0),
-        (ParamId::MotFluxMwb, 5.6),
-        (ParamId::MotRMohm, 6300.0),
-        (ParamId::MotLUh, 1750.0),
-        (ParamId::MotJGcm2, 80.0),
-        (ParamId::LimBusVMax, 14.0),
-        (ParamId::LimBusVMin, 9.0),
-        (ParamId::LimPhaseA, 1.0),
-        (ParamId::CtlRpmMax, 1500.0),
-        (ParamId::CtlRpmMin, 0.0),
-        (ParamId::PwmFreqHz, 0.0),
-    ] {
-        params.set(id, value).expect("in range");
-    }
+    let mut params = over(
+        Params::default(),
+        &[
+            (ParamId::MotPolePairs, 7.0),
+            (ParamId::MotFluxMwb, 5.6),
+            (ParamId::MotRMohm, 6300.0),
+            (ParamId::MotLUh, 1750.0),
+            (ParamId::MotJGcm2, 80.0),
+            (ParamId::LimBusVMax, 14.0),
+            (ParamId::LimBusVMin, 9.0),
+            (ParamId::LimPhaseA, 1.0),
+            (ParamId::CtlRpmMax, 1500.0),
+            (ParamId::CtlRpmMin, 0.0),
+            (ParamId::PwmFreqHz, 0.0),
+        ],
+    );
     // 0.8·14 V/(π/2·5.6 mWb/8).
     let hz = params.in_force().get(ParamId::PwmFreqHz);
     assert!((hz - 10_186.0).abs() < 10.0, "{hz}");
