@@ -14,8 +14,7 @@ use std::time::Instant;
 use serde::Serialize;
 use siskin_control::build::{BuildError, build};
 use siskin_control::drive::{self, Bridge, Sample, Setpoint};
-use siskin_params::Delay;
-use siskin_params::{BOSSO_BENCH, ParamId, Params};
+use siskin_params::{BOSSO_BENCH, Delay, ParamId, Params};
 
 use crate::plant::Fidelity;
 use crate::rig::{Bench, Rig};

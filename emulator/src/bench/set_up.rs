@@ -1,8 +1,7 @@
 //! The contents of a bench.
 
 use siskin_control::drive::Config;
-use siskin_params::Delay;
-use siskin_params::parts;
+use siskin_params::{Delay, parts};
 
 use super::choice::Choice;
 use super::load::LoadTable;

@@ -1,10 +1,7 @@
 //! Converts the plant's quantities to ADC counts.
 
 use siskin_control::drive::Sample;
-use siskin_params::Delay;
-use siskin_params::Image;
-use siskin_params::Shunts;
-use siskin_params::{Board, Greatest, LeastDeadTime};
+use siskin_params::{Board, Delay, Greatest, Image, LeastDeadTime, Shunts};
 use siskin_units::AdcCounts;
 
 use super::Noise;

@@ -3,8 +3,7 @@ use std::path::Path;
 
 use siskin_control::build::build;
 use siskin_control::drive::{Bridge, Setpoint};
-use siskin_params::Delay;
-use siskin_params::{BOSSO_BENCH, Params};
+use siskin_params::{BOSSO_BENCH, Delay, Params};
 use vcd::{Command, ScopeItem, Value};
 
 use super::{Recorder, Row};

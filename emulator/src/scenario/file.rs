@@ -4,9 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Deserialize;
-use siskin_params::Delay;
-use siskin_params::ParamId;
-use siskin_params::parts;
+use siskin_params::{Delay, ParamId, parts};
 use toml::{Table, Value};
 
 use super::ScenarioError;

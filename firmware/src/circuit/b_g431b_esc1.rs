@@ -1,10 +1,7 @@
 //! B-G431B-ESC1: three low-side shunts through on-chip op-amps, 6S, 40 A peak.
 
 use siskin_control::protection::Ntc;
-use siskin_params::Delay;
-use siskin_params::Shunts;
-use siskin_params::parts;
-use siskin_params::{Board, Greatest, LeastDeadTime, ParamId, PwmBound};
+use siskin_params::{Board, Delay, Greatest, LeastDeadTime, ParamId, PwmBound, Shunts, parts};
 
 use crate::image;
 

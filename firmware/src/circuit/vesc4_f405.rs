@@ -7,9 +7,7 @@
 //! divider of 33 kΩ is theirs alone.
 
 use siskin_control::protection::Ntc;
-use siskin_params::Delay;
-use siskin_params::Shunts;
-use siskin_params::{Board, Greatest, LeastDeadTime};
+use siskin_params::{Board, Delay, Greatest, LeastDeadTime, Shunts};
 
 use crate::image;
 

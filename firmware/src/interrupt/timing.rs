@@ -51,9 +51,9 @@ const fn dead_time_code(clocks: u16) -> u8 {
 #[cfg(test)]
 mod tests {
     use siskin_control::build::build;
-    use siskin_params::Delay;
-    use siskin_params::Shunts;
-    use siskin_params::{BOSSO_BENCH, Board, Greatest, LeastDeadTime, ParamId, Params};
+    use siskin_params::{
+        BOSSO_BENCH, Board, Delay, Greatest, LeastDeadTime, ParamId, Params, Shunts,
+    };
 
     use super::*;
 

@@ -7,9 +7,8 @@ use siskin_control::mavlink::Receiver;
 use siskin_control::record;
 use siskin_control::store;
 use siskin_control::throttle::{LockThrottle, Throttle};
-use siskin_params::Image;
 use siskin_params::choice::CtlObserver;
-use siskin_params::{Board, ParamId, Params};
+use siskin_params::{Board, Image, ParamId, Params};
 use static_cell::StaticCell;
 
 use super::health::Health;

@@ -16,8 +16,7 @@
 //! | 31 to 62 | name and board, zero-padded |
 //! | 63 | checksum, as in a KISS frame |
 
-use siskin_params::Image;
-use siskin_params::{ParamId, Params};
+use siskin_params::{Image, ParamId, Params};
 use siskin_units::math::round;
 
 use super::kiss::crc8;

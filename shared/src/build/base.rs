@@ -3,11 +3,8 @@
 use core::cell::Cell;
 use core::f32::consts::TAU;
 
-use siskin_params::Board;
-use siskin_params::FromMotor;
-use siskin_params::ParamId;
-use siskin_params::Params;
 use siskin_params::choice::CtlObserver;
+use siskin_params::{Board, FromMotor, ParamId, Params};
 
 use super::si::{SLOW_SHARE, Si, scale_of};
 use crate::control::PERIODS;

@@ -3,10 +3,8 @@
 use core::f32::consts::TAU;
 
 use fixed::types::{I0F32, U0F32};
-use siskin_params::LEAST_SHARE;
 use siskin_params::choice::{CtlFluxForm, CtlHall, CtlObserver};
-use siskin_params::parts;
-use siskin_params::{Board, ParamId, Params};
+use siskin_params::{Board, LEAST_SHARE, ParamId, Params, parts};
 use siskin_units::math::{Real, settled, square_root};
 use siskin_units::{Angle, Flux, Speed};
 

@@ -1,8 +1,7 @@
 //! Coefficients of the inductance adaptation.
 
-use siskin_params::ParamId;
 use siskin_params::choice::CtlAdaptL;
-use siskin_params::parts;
+use siskin_params::{ParamId, parts};
 
 use super::si::Si;
 use crate::control::inductance::{Config, MEAN_PERIODS_MAX};

@@ -31,15 +31,10 @@ use crate::control::low_speed;
 use crate::control::modulator::{self, Modulation};
 use crate::drive::{Config, Direction, Drift, Stop, Thresholds};
 use crate::protection;
-use siskin_params::BUS_UNITS_MIN;
-use siskin_params::ParamId;
-use siskin_params::Params;
-use siskin_params::Shunts;
 use siskin_params::choice::{
     CtlDrive, CtlModulation, CtlObserver, Inp3d, LimPolicy, MotDir, MotStop,
 };
-use siskin_params::parts;
-use siskin_params::{Board, TRIP_SHARE};
+use siskin_params::{BUS_UNITS_MIN, Board, ParamId, Params, Shunts, TRIP_SHARE, parts};
 use siskin_units::math::Real;
 use siskin_units::{AdcCounts, Current, Scale, Speed, Voltage, stated_emf};
 

@@ -2,10 +2,8 @@
 
 use core::f32::consts::TAU;
 
-use siskin_params::Delay;
-use siskin_params::ParamId;
 use siskin_params::choice::{CtlObsCure, CtlObserver};
-use siskin_params::parts;
+use siskin_params::{Delay, ParamId, parts};
 use siskin_units::math::{EIGHTH_PI, Multiplier, Real, settled, square_root};
 use siskin_units::{INVERSE_FLUX_NOMINAL, InverseFlux, Speed};
 

@@ -2,9 +2,8 @@
 
 use core::f32::consts::TAU;
 
-use siskin_params::ParamId;
 use siskin_params::choice::{CtlObserver, CtlRegulator, CtlSpeed};
-use siskin_params::parts;
+use siskin_params::{ParamId, parts};
 use siskin_units::Speed;
 use siskin_units::math::{Gain, Real, SQRT_3};
 

@@ -2,9 +2,8 @@
 
 use core::f32::consts::TAU;
 
-use siskin_params::ParamId;
 use siskin_params::choice::CtlRegulator;
-use siskin_params::parts;
+use siskin_params::{ParamId, parts};
 
 use super::si::Si;
 use crate::control::regulator::{Config, modified, observer_based, synchronous};

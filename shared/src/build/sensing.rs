@@ -2,8 +2,7 @@
 
 use core::f32::consts::{SQRT_2, TAU};
 
-use siskin_params::Shunts;
-use siskin_params::{Board, ParamId};
+use siskin_params::{Board, ParamId, Shunts};
 use siskin_units::math::{Real, SQRT_3};
 use siskin_units::{AdcCounts, Duty};
 

@@ -4,11 +4,8 @@ use core::cell::Cell;
 use core::f32::consts::FRAC_PI_2;
 
 use fixed::types::extra::Unsigned;
-use siskin_params::Board;
-use siskin_params::FromMotor;
-use siskin_params::Params;
 use siskin_params::choice::{CtlObsCure, CtlObserver};
-use siskin_params::{Choice, ParamId};
+use siskin_params::{Board, Choice, FromMotor, ParamId, Params};
 use siskin_units::math::{Gain, Multiplier, Number, Real, gain_parts};
 use siskin_units::{Scale, Voltage};
 

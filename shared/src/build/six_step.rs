@@ -3,9 +3,7 @@
 use core::f32::consts::TAU;
 
 use fixed::types::I1F31;
-use siskin_params::Delay;
-use siskin_params::ParamId;
-use siskin_params::Shunts;
+use siskin_params::{Delay, ParamId, Shunts};
 use siskin_units::Speed;
 use siskin_units::math::Real;
 

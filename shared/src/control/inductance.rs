@@ -7,8 +7,7 @@
 use fixed::types::{I0F32, I2F30};
 use siskin_params::parts;
 use siskin_units::math::{Gain, Multiplier, Number, divide};
-use siskin_units::traced;
-use siskin_units::{Current, Flux};
+use siskin_units::{Current, Flux, traced};
 
 traced! {
     /// L over the stated inductance, 0.5 to 1.7.

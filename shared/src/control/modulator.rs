@@ -4,14 +4,12 @@
 use crate::control::dead_time::Share;
 use fixed::types::extra::U20;
 use fixed::types::{I0F32, I1F31, I8F24};
-use siskin_params::Shunts;
-use siskin_params::parts;
+use siskin_params::{Shunts, parts};
 use siskin_units::dimension::Volt;
 use siskin_units::math::{Held, Multiplier, Quantity, Real, SQRT_3, TopProduct, TopSum, other_leg};
-use siskin_units::traced;
 use siskin_units::{
     Duty, InverseVoltage, Speed, TurnedVoltage, Voltage, VoltageSquare, WideVoltage,
-    WideVoltageSquare, wide,
+    WideVoltageSquare, traced, wide,
 };
 
 use super::dead_time;

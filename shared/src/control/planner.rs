@@ -5,9 +5,8 @@
 //! follows a command that moves within the slew without lag. The slew builds up over some
 //! milliseconds, so its torque is no step for the current loop.
 
-use siskin_units::Speed;
 use siskin_units::math::{Gain, Held};
-use siskin_units::traced;
+use siskin_units::{Speed, traced};
 
 /// Limits of the trajectory.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -9,8 +9,7 @@
 use fixed::types::I16F16;
 use siskin_params::Shunts;
 use siskin_units::math::Held;
-use siskin_units::traced;
-use siskin_units::{AdcCounts, Duty};
+use siskin_units::{AdcCounts, Duty, traced};
 
 /// Coefficients of the reconstruction.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -7,9 +7,8 @@
 use fixed::types::extra::U28;
 use siskin_units::dimension::TurnPerPeriod;
 use siskin_units::math::{Gain, Held, Quantity, TopProduct};
-use siskin_units::traced;
 use siskin_units::{
-    Angle, Charge, Current, CurrentRate, InverseFlux, QUARTER_TURN, Speed, Voltage,
+    Angle, Charge, Current, CurrentRate, InverseFlux, QUARTER_TURN, Speed, Voltage, traced,
 };
 
 use super::transform::Dq;

@@ -3,9 +3,8 @@
 //! Voltage mode and tests go through it too. i_q* takes a few milliseconds across its range: at speed the current
 //! loop overshoots a step by half, and a 40 A step would end in the over-current trip.
 
-use siskin_units::Current;
 use siskin_units::math::Held;
-use siskin_units::traced;
+use siskin_units::{Current, traced};
 
 use super::regulator::Reference;
 use super::speed::Bounds;

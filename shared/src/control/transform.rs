@@ -3,8 +3,7 @@
 use fixed::types::{I0F32, I1F31};
 use siskin_units::math::{Held, Number, SinCos, TopProduct, TopSum};
 use siskin_units::trace::Trace;
-use siskin_units::traced;
-use siskin_units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage};
+use siskin_units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage, traced};
 
 traced! {
     /// A vector in the stator's frame.

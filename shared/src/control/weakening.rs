@@ -5,8 +5,7 @@
 //! missing i_d falls, with voltage to spare it returns to zero: below the speed where the supply binds there is none.
 
 use siskin_units::math::{Held, Multiplier, other_leg};
-use siskin_units::traced;
-use siskin_units::{Current, Speed, Voltage, WideVoltage, stated_emf, wide};
+use siskin_units::{Current, Speed, Voltage, WideVoltage, stated_emf, traced, wide};
 
 use super::modulator::VectorLimit;
 use super::speed::Bounds;

@@ -5,8 +5,7 @@ pub mod tone;
 
 use core::mem::MaybeUninit;
 
-use siskin_params::Delay;
-use siskin_params::parts;
+use siskin_params::{Delay, parts};
 use siskin_units::math::{Gain, Multiplier};
 use siskin_units::{AdcCounts, Current, Duty, Scale, Speed, Voltage, WideVoltage};
 

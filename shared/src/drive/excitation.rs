@@ -1,8 +1,7 @@
 //! The identification's excitation of a standing motor's windings.
 
 use siskin_params::parts::Identification;
-use siskin_units::Current;
-use siskin_units::traced;
+use siskin_units::{Current, traced};
 
 traced! {
     /// Direction of the square wave.

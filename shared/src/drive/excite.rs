@@ -10,8 +10,7 @@
 //! difference between two currents yields R without it.
 
 use siskin_params::Delay;
-use siskin_units::traced;
-use siskin_units::{AdcCounts, Angle, Current, Duty, Speed, Voltage};
+use siskin_units::{AdcCounts, Angle, Current, Duty, Speed, Voltage, traced};
 
 use super::config::Config;
 use super::excitation::{Excitation, Ripple};

@@ -4,8 +4,7 @@
 //! The field-oriented drive catches a turning rotor where it is, stops one that turns the other way first, follows a
 //! slow one, and parks a standing one. Six-step seeks the rotor by turning it.
 
-use siskin_units::Speed;
-use siskin_units::traced;
+use siskin_units::{Speed, traced};
 
 use super::config::{Config, Direction};
 use super::io::Sample;

@@ -3,8 +3,7 @@
 //! Its phase is the one these values belong to; the drive's own, `State::phase`, may already be the next.
 
 use siskin_units::math::TopProduct;
-use siskin_units::traced;
-use siskin_units::{AdcCounts, Angle, Current, Speed, Voltage};
+use siskin_units::{AdcCounts, Angle, Current, Speed, Voltage, traced};
 
 use super::phase::Phase;
 use crate::control::modulator::Supply;

@@ -7,8 +7,7 @@
 //! comparator on that leg's shunt, or the gate driver. The last current remains readable, at one period's pace or
 //! slower.
 
-use siskin_units::traced;
-use siskin_units::{AdcCounts, Duty};
+use siskin_units::{AdcCounts, Duty, traced};
 
 use super::config::Config;
 use super::io::Bridge;

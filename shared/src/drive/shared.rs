@@ -1,10 +1,8 @@
 //! State that every mode uses and none owns: protection, current offsets, faults, applied duties.
 
-use siskin_params::Delay;
-use siskin_params::Shunts;
+use siskin_params::{Delay, Shunts};
 use siskin_units::math::Held;
-use siskin_units::traced;
-use siskin_units::{AdcCounts, Duty, Speed, Voltage};
+use siskin_units::{AdcCounts, Duty, Speed, Voltage, traced};
 
 use super::config::{ATTEMPTS, Config, Direction, QUICK_ATTEMPTS};
 use super::io::{Rotation, Sample, Setpoint};

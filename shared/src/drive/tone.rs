@@ -15,8 +15,9 @@
 //! has not produced the current. What both as stated would need is the maximum.
 
 use siskin_units::math::{Held, SinCos, TopProduct, magnitude};
-use siskin_units::traced;
-use siskin_units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage, WideVoltage, wide};
+use siskin_units::{
+    AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage, WideVoltage, traced, wide,
+};
 
 use super::config::Config;
 use super::config::tone::{self, PITCH_MAX};

@@ -3,8 +3,7 @@
 use std::string::{String, ToString};
 use std::vec::Vec;
 
-use siskin_params::BOSSO_MOTOR;
-use siskin_params::Image;
+use siskin_params::{BOSSO_MOTOR, Image};
 use siskin_throttle::access::Access;
 use siskin_throttle::answer::Ask;
 use siskin_throttle::command::Beacon;

@@ -4,8 +4,7 @@
 use siskin_params::ParamId;
 use siskin_throttle::News;
 use siskin_throttle::calibration::Step;
-use siskin_throttle::command::Beacon;
-use siskin_throttle::command::Order;
+use siskin_throttle::command::{Beacon, Order};
 use siskin_throttle::endpoints::EndPoints;
 
 use super::Esc;

@@ -7,8 +7,7 @@ use mavlink::dialects::ardupilotmega::{
     MISSION_REQUEST_LIST_DATA, MavSeverity, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA,
     PARAM_SET_DATA, SETUP_SIGNING_DATA,
 };
-use siskin_params::Image;
-use siskin_params::{ParamId, Params};
+use siskin_params::{Image, ParamId, Params};
 use siskin_throttle::News;
 
 use super::command::{ACCEPTED, Command, Commands, FAILED, IDENTIFY, RUN_PREARM_CHECKS};

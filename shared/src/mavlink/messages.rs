@@ -3,8 +3,7 @@
 use mavlink::dialects::ardupilotmega::{
     EscConnectionType, MavModeFlag, MavParamType, MavProtocolCapability, MavState,
 };
-use siskin_params::Image;
-use siskin_params::{ParamId, Params, TABLE};
+use siskin_params::{Image, ParamId, Params, TABLE};
 use siskin_throttle::signal::{Pulse, Signal};
 use siskin_units::math::{quotient, round};
 

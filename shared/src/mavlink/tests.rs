@@ -15,9 +15,7 @@ use mavlink::{
 };
 use std::vec::Vec;
 
-use siskin_params::Board;
-use siskin_params::Image;
-use siskin_params::{BOSSO_BENCH, ParamId, Params};
+use siskin_params::{BOSSO_BENCH, Board, Image, ParamId, Params};
 use siskin_throttle::authority::{Authority, Timing};
 
 use super::*;

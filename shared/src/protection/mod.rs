@@ -9,8 +9,7 @@ pub use ntc::Ntc;
 use crate::control::speed::Bounds;
 use crate::control::transform::Dq;
 use siskin_units::math::{Gain, Held, Multiplier, magnitude};
-use siskin_units::traced;
-use siskin_units::{AdcCounts, Current, Voltage};
+use siskin_units::{AdcCounts, Current, Voltage, traced};
 
 /// Periods by which the supply voltage is extrapolated: 8 for the filter's lag, 16 until a bound is updated
 /// again, and 24 for the current to follow, three time constants of a current loop with a 48th of the PWM's frequency.

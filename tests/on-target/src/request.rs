@@ -2,10 +2,9 @@
 
 use fixed::types::I1F31;
 use siskin_control::drive::{Excitation, Fault, Pull, Sample, Setpoint};
-use siskin_params::Delay;
-use siskin_params::Image;
-use siskin_params::Shunts;
-use siskin_params::{BOSSO_BENCH, Board, Greatest, LeastDeadTime, ParamId, Params, TABLE};
+use siskin_params::{
+    BOSSO_BENCH, Board, Delay, Greatest, Image, LeastDeadTime, ParamId, Params, Shunts, TABLE,
+};
 use siskin_units::{AdcCounts, Current, Speed};
 
 /// Words of the parameters and the board.

@@ -12,8 +12,7 @@ use siskin_control::check::Report;
 use siskin_control::mavlink::{Component, Context, Frame, Receiver, Request, Warning, digits};
 use siskin_control::telemetry::Telemetry;
 use siskin_emulator::plant::Sensing;
-use siskin_params::Delay;
-use siskin_params::{ParamId, Params};
+use siskin_params::{Delay, ParamId, Params};
 use siskin_throttle::authority::{Authority, Timing};
 
 use crate::run::{Run, siskin};

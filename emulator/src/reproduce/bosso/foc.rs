@@ -5,8 +5,7 @@ use std::f64::consts::TAU;
 
 use siskin_control::build::build;
 use siskin_control::drive::{Bridge, Phase, Setpoint};
-use siskin_params::Delay;
-use siskin_params::{BOSSO_BENCH, ParamId, Params};
+use siskin_params::{BOSSO_BENCH, Delay, ParamId, Params};
 
 use super::course::{Course, Legs};
 use super::means::{Means, seek};

@@ -7,8 +7,7 @@ use fixed::types::extra::Unsigned;
 use siskin_control::build::build;
 use siskin_control::control::PERIODS;
 use siskin_control::control::{observer, regulator, speed};
-use siskin_params::Delay;
-use siskin_params::{BOSSO_BENCH, BOSSO_TABLE_III, Params};
+use siskin_params::{BOSSO_BENCH, BOSSO_TABLE_III, Delay, Params};
 use siskin_units::Scale;
 use siskin_units::math::{Gain, Number};
 

@@ -9,9 +9,7 @@ use siskin_control::control::observer;
 use siskin_control::control::observer::edges::{self, Sensors};
 use siskin_control::control::observer::flux_linkage::{self, HighPass};
 use siskin_control::control::observer::{crossing, position};
-use siskin_params::Delay;
-use siskin_params::parts;
-use siskin_params::{BOSSO_BENCH, ParamId, Params};
+use siskin_params::{BOSSO_BENCH, Delay, ParamId, Params, parts};
 use siskin_units::math::Gain;
 use siskin_units::{Angle, Current, FLUX_NOMINAL, Speed, Voltage};
 

@@ -2,8 +2,7 @@
 
 use fixed::types::{I2F30, I4F28, I17F15, I19F13};
 use siskin_units::math::{SinCos, TopProduct};
-use siskin_units::traced;
-use siskin_units::{AdcCounts, Angle};
+use siskin_units::{AdcCounts, Angle, traced};
 
 use crate::control::transform::{AlphaBeta, phases};
 

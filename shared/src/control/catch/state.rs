@@ -1,8 +1,7 @@
 //! Configuration and state of the observation.
 
 use fixed::types::{I0F32, I17F15, I20F12};
-use siskin_units::traced;
-use siskin_units::{AdcCounts, Angle, Speed};
+use siskin_units::{AdcCounts, Angle, Speed, traced};
 
 use super::compare::Difference;
 

@@ -10,8 +10,9 @@ use siskin_units::dimension::TurnPerPeriod;
 use siskin_units::math::{
     Gain, Held, Quantity, SinCos, TopProduct, atan2_turns, divide, magnitude,
 };
-use siskin_units::traced;
-use siskin_units::{Angle, Current, CurrentRate, Flux, InverseFlux, Speed, Voltage, stated_emf};
+use siskin_units::{
+    Angle, Current, CurrentRate, Flux, InverseFlux, Speed, Voltage, stated_emf, traced,
+};
 
 use super::{Estimate, SlowEstimate};
 use crate::control::regulator::Feedback;

@@ -14,10 +14,9 @@ use siskin_units::dimension::Weber;
 use siskin_units::math::{
     EIGHTH_PI, Gain, Held, Multiplier, Quantity, SinCos, TopProduct, TopSum, sin_cos,
 };
-use siskin_units::traced;
 use siskin_units::{
     Angle, Current, FLUX_NOMINAL, Flux, InverseFlux, Speed, SpeedSquare, Voltage, WideFlux,
-    WideVoltage,
+    WideVoltage, traced,
 };
 
 use super::{Estimate, Input, SlowEstimate};

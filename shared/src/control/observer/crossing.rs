@@ -3,8 +3,7 @@
 
 use fixed::types::{I0F32, U0F32};
 use siskin_units::math::{Held, TopProduct, divide};
-use siskin_units::traced;
-use siskin_units::{Angle, Flux, Speed};
+use siskin_units::{Angle, Flux, Speed, traced};
 
 use super::flux_linkage::{AMPLITUDE_MAX, AMPLITUDE_MIN, measure};
 use super::position::{Periods, turned};

@@ -4,8 +4,7 @@
 //! Forward rotation only: for the other direction the drive swaps phases b and c in all inputs.
 
 use siskin_params::parts;
-use siskin_units::traced;
-use siskin_units::{Angle, Current, Speed, Voltage};
+use siskin_units::{Angle, Current, Speed, Voltage, traced};
 
 use super::crossing::{self, Crossing};
 use super::flux_linkage;

@@ -1,8 +1,7 @@
 //! Input and estimate of every observer.
 
 use siskin_units::math::SinCos;
-use siskin_units::traced;
-use siskin_units::{Angle, Current, INVERSE_FLUX_NOMINAL, InverseFlux, Speed, Voltage};
+use siskin_units::{Angle, Current, INVERSE_FLUX_NOMINAL, InverseFlux, Speed, Voltage, traced};
 
 use crate::control::inductance::Factor;
 use crate::control::transform::AlphaBeta;

@@ -4,8 +4,7 @@
 use fixed::FixedI32;
 use fixed::types::extra::U32;
 use siskin_units::math::{Gain, Held, SinCos, TopProduct, atan2_turns};
-use siskin_units::traced;
-use siskin_units::{Angle, Current, FLUX_NOMINAL, Flux, Speed, Voltage};
+use siskin_units::{Angle, Current, FLUX_NOMINAL, Flux, Speed, Voltage, traced};
 
 use super::sector::Sector;
 

@@ -1,8 +1,7 @@
 //! No observer: an encoder, or a simulation that knows the truth, supplies the rotor's position.
 
 use siskin_units::math::{Held, SinCos};
-use siskin_units::traced;
-use siskin_units::{Angle, Speed};
+use siskin_units::{Angle, Speed, traced};
 
 use super::{Estimate, SlowEstimate};
 

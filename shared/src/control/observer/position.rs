@@ -7,8 +7,7 @@
 
 use fixed::types::U20F12;
 use siskin_units::math::{Gain, divide};
-use siskin_units::traced;
-use siskin_units::{Angle, QUARTER_TURN, Speed};
+use siskin_units::{Angle, QUARTER_TURN, Speed, traced};
 
 use super::sector::Sector;
 

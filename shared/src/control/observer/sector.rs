@@ -1,8 +1,7 @@
 //! The sixths of an electrical turn that the signs of three fluxes distinguish (second paper, figures 22 and 24),
 //! shared by flux crossings and Hall sensors.
 
-use siskin_units::Angle;
-use siskin_units::traced;
+use siskin_units::{Angle, traced};
 
 traced! {
     /// One of six sectors of 60°, numbered in the positive direction. The middle of the first is at 0°, where the

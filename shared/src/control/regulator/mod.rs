@@ -10,8 +10,7 @@ mod reference;
 pub mod synchronous;
 
 use siskin_params::parts;
-use siskin_units::traced;
-use siskin_units::{Current, Speed, Voltage, WideVoltage, wide};
+use siskin_units::{Current, Speed, Voltage, WideVoltage, traced, wide};
 
 use super::inductance::Factor;
 use super::transform::Dq;

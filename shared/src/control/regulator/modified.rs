@@ -7,8 +7,7 @@
 
 use fixed::types::extra::U28;
 use siskin_units::math::{Gain, Held, SinCos, TopProduct, atan2_turns, magnitude};
-use siskin_units::traced;
-use siskin_units::{Angle, Current, QUARTER_TURN, Voltage, WideVoltage};
+use siskin_units::{Angle, Current, QUARTER_TURN, Voltage, WideVoltage, traced};
 
 use super::reference::{Feedback, Reference, excess_current};
 use crate::control::transform::Dq;

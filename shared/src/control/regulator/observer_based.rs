@@ -1,8 +1,7 @@
 //! The observer-based current regulator of the first paper (10).
 
 use siskin_units::math::{Gain, Held, TopProduct};
-use siskin_units::traced;
-use siskin_units::{Current, CurrentRate, Voltage, WideVoltage, narrow};
+use siskin_units::{Current, CurrentRate, Voltage, WideVoltage, narrow, traced};
 
 use super::reference::{Feedback, Reference, excess_current};
 use crate::control::transform::Dq;

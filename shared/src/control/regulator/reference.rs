@@ -2,8 +2,7 @@
 //! cut off.
 
 use siskin_units::math::Gain;
-use siskin_units::traced;
-use siskin_units::{Current, Speed, Voltage, WideVoltage, narrow};
+use siskin_units::{Current, Speed, Voltage, WideVoltage, narrow, traced};
 
 use crate::control::inductance::Factor;
 use crate::control::transform::Dq;

@@ -5,8 +5,7 @@
 //! k_p = bandwidth·L.
 
 use siskin_units::math::{Gain, Held, Multiplier};
-use siskin_units::traced;
-use siskin_units::{Current, Speed, Voltage, WideVoltage, wide};
+use siskin_units::{Current, Speed, Voltage, WideVoltage, traced, wide};
 
 use super::reference::{Feedback, Reference};
 use crate::control::inductance::Factor;

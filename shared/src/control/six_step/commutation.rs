@@ -1,7 +1,6 @@
 //! The six sextants: each leg's role, and the rotor's position meanwhile.
 
-use siskin_units::Angle;
-use siskin_units::traced;
+use siskin_units::{Angle, traced};
 
 traced! {
     /// A sextant, named after the switching leg and the leg held low. The current vector stands at 30°, 90° and so

@@ -15,9 +15,8 @@
 //! seen above first.
 
 use fixed::types::I16F16;
-use siskin_units::Voltage;
 use siskin_units::math::{Held, divide};
-use siskin_units::traced;
+use siskin_units::{Voltage, traced};
 
 /// Thresholds.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -6,8 +6,7 @@
 
 use fixed::types::I1F31;
 use siskin_units::math::{Gain, Held};
-use siskin_units::traced;
-use siskin_units::{Current, Duty, Speed};
+use siskin_units::{Current, Duty, Speed, traced};
 
 use crate::control::speed::Bounds;
 

@@ -3,8 +3,7 @@
 use fixed::types::I16F16;
 use siskin_params::Delay;
 use siskin_units::math::{Held, divide};
-use siskin_units::traced;
-use siskin_units::{Angle, Speed};
+use siskin_units::{Angle, Speed, traced};
 
 use super::commutation::{HALF_SEXTANT, SEXTANT};
 

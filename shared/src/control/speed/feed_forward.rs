@@ -3,8 +3,7 @@
 //! that speed, which bypasses the current regulator.
 
 use siskin_units::math::{Gain, Held, TopProduct};
-use siskin_units::traced;
-use siskin_units::{Current, Speed, SpeedSquare, Voltage};
+use siskin_units::{Current, Speed, SpeedSquare, Voltage, traced};
 
 use super::Input;
 use crate::control::regulator::Reference;

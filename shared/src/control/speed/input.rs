@@ -1,7 +1,6 @@
 //! Input to both speed laws.
 
-use siskin_units::traced;
-use siskin_units::{Current, Speed};
+use siskin_units::{Current, Speed, traced};
 
 use crate::control::observer::SlowEstimate;
 

@@ -5,8 +5,7 @@ mod input;
 pub mod nested;
 
 use siskin_params::parts;
-use siskin_units::traced;
-use siskin_units::{Current, Speed, stated_torque};
+use siskin_units::{Current, Speed, stated_torque, traced};
 
 use super::planner;
 use super::regulator::Reference;

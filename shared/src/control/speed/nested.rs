@@ -6,8 +6,7 @@
 
 use fixed::types::I0F32;
 use siskin_units::math::{Gain, Held, TopProduct};
-use siskin_units::traced;
-use siskin_units::{Current, Speed, Torque, Voltage, stated_torque};
+use siskin_units::{Current, Speed, Torque, Voltage, stated_torque, traced};
 
 use super::input::Input;
 use crate::control::regulator::Reference;

@@ -2,8 +2,7 @@
 
 use siskin_units::math::SinCos;
 use siskin_units::trace::Trace;
-use siskin_units::traced;
-use siskin_units::{Angle, Current, Speed, Voltage};
+use siskin_units::{Angle, Current, Speed, Voltage, traced};
 
 use crate::control::inductance;
 use crate::control::regulator::{self, Reference};

@@ -228,8 +228,7 @@ pub(super) fn bridge(
 
 #[cfg(test)]
 mod tests {
-    use siskin_params::Shunts;
-    use siskin_params::{BOSSO_BENCH, Board, ParamId, Params};
+    use siskin_params::{BOSSO_BENCH, Board, ParamId, Params, Shunts};
 
     use super::*;
     use crate::build::build;

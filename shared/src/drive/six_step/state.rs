@@ -1,8 +1,7 @@
 //! State of the six-step drive.
 
 use fixed::types::I1F31;
-use siskin_units::Angle;
-use siskin_units::traced;
+use siskin_units::{Angle, traced};
 
 use crate::control::PERIODS;
 use crate::control::planner;

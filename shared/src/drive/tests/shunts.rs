@@ -1,8 +1,7 @@
 //! Two shunts: the third phase follows from the other two.
 
-use siskin_params::BOSSO_MOTOR;
-use siskin_params::Shunts;
 use siskin_params::choice::StaMode;
+use siskin_params::{BOSSO_MOTOR, Shunts};
 
 use super::*;
 

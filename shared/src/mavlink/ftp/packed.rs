@@ -7,8 +7,7 @@
 //! ArduPilot pads with zeros so that no value straddles two reads; that is unnecessary here, since a file that changes
 //! can no longer be read.
 
-use siskin_params::Board;
-use siskin_params::{ParamId, Params};
+use siskin_params::{Board, ParamId, Params};
 
 use super::sink::Sink;
 

@@ -5,8 +5,7 @@ use std::string::String;
 use std::vec::Vec;
 
 use siskin_params::checksum::checksum;
-use siskin_params::{Board, LeastDeadTime};
-use siskin_params::{ParamId, Params, TABLE};
+use siskin_params::{Board, LeastDeadTime, ParamId, Params, TABLE};
 
 use super::files::{Entry, File};
 use super::sink::Sink;

@@ -3,9 +3,7 @@
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
-use siskin_params::Delay;
-use siskin_params::parts;
-use siskin_params::{BOSSO_BENCH, Board, ParamId, Params};
+use siskin_params::{BOSSO_BENCH, Board, Delay, ParamId, Params, parts};
 use siskin_units::{Scale, Voltage};
 
 use super::*;

@@ -4,8 +4,7 @@ use proptest::prelude::*;
 use std::f64::consts::TAU;
 use std::vec::Vec;
 
-use siskin_params::parts;
-use siskin_params::{BOSSO_BENCH, Board, ParamId, Params};
+use siskin_params::{BOSSO_BENCH, Board, ParamId, Params, parts};
 use siskin_units::Scale;
 
 use super::*;
